@@ -174,6 +174,20 @@ typedef struct es_image_save_desc {
  * Written to a temporary name beside `path` and renamed, so a failure leaves nothing behind. desc NULL: defaults. */
 ES_API es_result es_image_save(es_context* context, const es_image* image, const char* path, const es_image_save_desc* desc);
 
+/* ---- settings: typed values with a name, a range and a default, listed, read and written as text ------------------------ */
+
+typedef enum es_setting_type { ES_SETTING_BOOL, ES_SETTING_INT, ES_SETTING_FLOAT, ES_SETTING_CHOICE } es_setting_type;
+
+typedef struct es_setting {
+    const char* name;          /* lower case, words joined by '-' , grouped by a prefix and '.' */
+    es_setting_type type;
+    const char* default_text;  /* as es_settings_set takes it */
+    double minimum, maximum;   /* INT, FLOAT */
+    const char* choices;       /* CHOICE: names separated by '|'; the value is the index */
+    const char* help;          /* one line, with the unit */
+    size_t offset;             /* of a bool, uint32_t, float or uint32_t in the settings struct */
+} es_setting;
+
 /* ---- window --------------------------------------------------------------------------------------------------------- */
 
 typedef struct es_window es_window;

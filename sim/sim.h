@@ -1,0 +1,224 @@
+/* Earthshine, floor 2: the world.
+ *
+ * What exists and how it moves: meshes, textures, materials, instances in a node tree, cameras, lights, animation clips;
+ * built-in scenes; glTF 2.0 import. The world keeps last frame's pose and marks what changed, so that the light above
+ * knows what it may keep.
+ *
+ * Everything created has a handle: a generation id by value, zero is null, a destroyed object's handle stays stale.
+ * Getters copy out; pointers returned are valid until the next call that changes the world.
+ */
+#ifndef EARTHSHINE_SIM_H
+#define EARTHSHINE_SIM_H
+
+#include <earthshine/platform.h>
+#include <earthshine/raster.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct es_world es_world;
+
+typedef struct es_texture { uint32_t id; } es_texture;
+typedef struct es_material { uint32_t id; } es_material;
+typedef struct es_mesh { uint32_t id; } es_mesh;
+typedef struct es_node { uint32_t id; } es_node;
+typedef struct es_instance { uint32_t id; } es_instance;
+typedef struct es_camera { uint32_t id; } es_camera;
+typedef struct es_light { uint32_t id; } es_light;
+typedef struct es_clip { uint32_t id; } es_clip;
+
+/* ---- the world itself ------------------------------------------------------------------------------------------------------------ */
+
+typedef struct es_world_settings {
+    uint32_t triangles;      /* built-in scenes: triangles to aim at; 0: the scene's own number */
+    float speed;             /* of time, 0 … 100 */
+    uint32_t camera;         /* which of the file's or scene's cameras, counted from 0 */
+    uint32_t clip;           /* which clip plays: 0 all that do not touch the same node, n the n-th */
+    bool default_light;      /* files without lights get one */
+} es_world_settings;
+
+ES_API es_world_settings es_default_world_settings(void);
+ES_API size_t es_world_setting_count(void);
+ES_API const es_setting* es_world_setting(size_t index);
+ES_API es_result es_world_settings_set(es_context* context, es_world_settings* settings, const char* name, const char* value);
+
+ES_API es_result es_world_create(es_context* context, const es_world_settings* settings, es_world** world);
+ES_API void es_world_destroy(es_world* world);
+ES_API es_context* es_world_context(const es_world* world);
+
+/* Built-in scenes: cornell, room, hall … */
+ES_API size_t es_scene_count(void);
+ES_API const char* es_scene_name(size_t index);
+ES_API const char* es_scene_description(size_t index);
+/* settings NULL: defaults. SCENE_UNKNOWN names the nearest. */
+ES_API es_result es_world_create_scene(es_context* context, const char* name, const es_world_settings* settings, es_world** world);
+/* .gltf or .glb by content. What is left out is warned of; what cannot be shown at all is refused. A file without a camera gets
+ * one that frames it; without a light, a directional light of 3 W/m² from above the camera's left shoulder. */
+ES_API es_result es_world_import_gltf(es_context* context, const char* path, const es_world_settings* settings, es_world** world);
+/* A built-in scene's name, or else a file. */
+ES_API es_result es_world_open(es_context* context, const char* scene_or_path, const es_world_settings* settings, es_world** world);
+
+/* Advances by dt seconds (0 … 10) times settings.speed: the present pose becomes the last one; clips, then the step function
+ * move things; transforms, views and marks are updated. dt = 0 keeps the pose and ends all motion. */
+ES_API es_result es_world_step(es_world* world, float dt);
+ES_API double es_world_time(const es_world* world);
+/* Called by es_world_step after the clips, with the new time. It may use every function of the world but step and destroy. */
+typedef void (*es_world_step_function)(es_world* world, void* user, double time, float dt);
+ES_API void es_world_set_step_function(es_world* world, es_world_step_function function, void* user);
+
+/* The state that moves (time, node transforms now and last, lights, cameras, deformed meshes), not the assets. NULL buffer: *size is set.
+ * Restoring needs the same world content; a buffer that does not fit is refused. */
+ES_API es_result es_world_save(const es_world* world, void* buffer, size_t* size);
+ES_API es_result es_world_restore(es_world* world, const void* buffer, size_t size);
+ES_API uint64_t es_world_hash(const es_world* world); /* of the saved state */
+
+/* ---- assets --------------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct es_texture_desc { const char* name; uint32_t width, height; const uint8_t* rgba; bool srgb; } es_texture_desc;
+ES_API es_result es_world_add_texture(es_world* world, const es_texture_desc* desc, es_texture* texture);
+/* For es_material_desc's texture uses; NULL for a stale handle. Valid while the texture exists. */
+ES_API const es_texture_image* es_world_texture_image(const es_world* world, es_texture texture);
+
+ES_API es_result es_world_add_material(es_world* world, const char* name, const es_material_desc* desc, es_material* material);
+ES_API es_result es_world_set_material(es_world* world, es_material material, const es_material_desc* desc);
+ES_API es_result es_world_get_material(const es_world* world, es_material material, es_material_desc* desc);
+
+/* Arrays are copied. Triangles with an index out of range, or vertices that are not finite or beyond 1e9 m, are refused. */
+typedef struct es_mesh_desc {
+    const char* name;
+    uint32_t vertex_count, triangle_count;
+    const float* positions;   /* 3 per vertex */
+    const float* normals;     /* 3 per vertex, or NULL: computed, smooth over shared vertices */
+    const float* tangents;    /* 4 per vertex or NULL */
+    const float* uv0;         /* 2 per vertex or NULL */
+    const float* uv1;         /* 2 per vertex or NULL */
+    const float* colors;      /* 4 per vertex, linear, or NULL */
+    const uint32_t* indices;  /* 3 per triangle */
+    bool flat_normals;        /* with normals NULL: none are stored and the triangle's own is used (glTF's rule) */
+} es_mesh_desc;
+ES_API es_result es_world_add_mesh(es_world* world, const es_mesh_desc* desc, es_mesh* mesh);
+/* Moves the vertices (3 floats each): the old ones become last frame's. normals NULL: kept. Call it from the step function. */
+ES_API es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* positions, const float* normals);
+ES_API const es_raster_mesh* es_world_mesh(const es_world* world, es_mesh mesh);
+
+/* ---- the node tree ------------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct es_transform { es_vec3 translation; es_quat rotation; es_vec3 scale; } es_transform;
+ES_API es_transform es_identity_transform(void);
+
+typedef struct es_node_desc { const char* name; es_node parent; es_transform transform; } es_node_desc;
+ES_API es_result es_world_add_node(es_world* world, const es_node_desc* desc, es_node* node);
+ES_API es_result es_world_set_node_transform(es_world* world, es_node node, const es_transform* transform);
+ES_API es_result es_world_get_node_transform(const es_world* world, es_node node, es_transform* transform);
+ES_API es_result es_world_get_node_matrix(const es_world* world, es_node node, es_mat4* to_world);
+ES_API es_node es_world_find_node(const es_world* world, const char* name);
+
+typedef struct es_instance_desc { es_node node; es_mesh mesh; es_material material; bool hidden; } es_instance_desc;
+ES_API es_result es_world_add_instance(es_world* world, const es_instance_desc* desc, es_instance* instance);
+ES_API es_result es_world_set_instance(es_world* world, es_instance instance, const es_instance_desc* desc);
+ES_API es_result es_world_get_instance(const es_world* world, es_instance instance, es_instance_desc* desc);
+
+/* ---- cameras and lights: they sit on nodes and look along the node's -z --------------------------------------------------------------------- */
+
+typedef struct es_camera_desc {
+    const char* name;
+    es_node node;
+    bool orthographic;
+    float fov_y;              /* radians, default 0.8 */
+    float half_height;        /* orthographic, metres */
+    float near_plane, far_plane; /* metres; far is used by orthographic cameras only */
+} es_camera_desc;
+ES_API es_camera_desc es_default_camera_desc(void);
+ES_API es_result es_world_add_camera(es_world* world, const es_camera_desc* desc, es_camera* camera);
+ES_API es_result es_world_set_camera(es_world* world, es_camera camera, const es_camera_desc* desc);
+ES_API es_result es_world_get_camera(const es_world* world, es_camera camera, es_camera_desc* desc);
+/* The camera that es_renderer_render looks through; null when the world has none. */
+ES_API es_camera es_world_active_camera(const es_world* world);
+ES_API es_result es_world_set_active_camera(es_world* world, es_camera camera);
+/* This frame's and last frame's view of a camera, for drawing. */
+ES_API es_result es_world_camera_view(const es_world* world, es_camera camera, uint32_t width, uint32_t height, es_raster_view* view);
+
+typedef enum es_light_type { ES_LIGHT_SPOT, ES_LIGHT_POINT, ES_LIGHT_DIRECTIONAL } es_light_type;
+typedef struct es_light_desc {
+    const char* name;
+    es_node node;
+    es_light_type type;
+    float color[3];           /* linear, times intensity */
+    float intensity;          /* W/sr for spot and point, W/m² for directional */
+    float inner_cone, outer_cone; /* spot: half angles, radians; glTF's falloff between them */
+    float range;              /* metres; 0: unlimited (glTF's window otherwise) */
+    bool off;
+} es_light_desc;
+ES_API es_light_desc es_default_light_desc(void);
+ES_API es_result es_world_add_light(es_world* world, const es_light_desc* desc, es_light* light);
+ES_API es_result es_world_set_light(es_world* world, es_light light, const es_light_desc* desc);
+ES_API es_result es_world_get_light(const es_world* world, es_light light, es_light_desc* desc);
+
+/* ---- clips ------------------------------------------------------------------------------------------------------------------------------------ */
+
+typedef enum es_clip_path { ES_CLIP_TRANSLATION, ES_CLIP_ROTATION, ES_CLIP_SCALE } es_clip_path;
+typedef enum es_interpolation { ES_INTERPOLATE_STEP, ES_INTERPOLATE_LINEAR, ES_INTERPOLATE_CUBIC_SPLINE } es_interpolation;
+typedef struct es_clip_channel {
+    es_node node;
+    es_clip_path path;
+    es_interpolation interpolation;
+    uint32_t key_count;
+    const float* times;       /* seconds, strictly increasing */
+    const float* values;      /* 3 or 4 per key; cubic spline: in-tangent, value, out-tangent per key */
+} es_clip_channel;
+typedef struct es_clip_desc { const char* name; uint32_t channel_count; const es_clip_channel* channels; } es_clip_desc;
+/* Copied. Clips loop over their duration. */
+ES_API es_result es_world_add_clip(es_world* world, const es_clip_desc* desc, es_clip* clip);
+ES_API es_result es_world_play_clip(es_world* world, es_clip clip, bool play);
+
+/* ---- destroying and enumerating ----------------------------------------------------------------------------------------------------------------- */
+
+/* Refused (WRONG_STATE) while something that exists refers to the object. */
+ES_API es_result es_world_destroy_texture(es_world* world, es_texture texture);
+ES_API es_result es_world_destroy_material(es_world* world, es_material material);
+ES_API es_result es_world_destroy_mesh(es_world* world, es_mesh mesh);
+ES_API es_result es_world_destroy_node(es_world* world, es_node node);
+ES_API es_result es_world_destroy_instance(es_world* world, es_instance instance);
+ES_API es_result es_world_destroy_camera(es_world* world, es_camera camera);
+ES_API es_result es_world_destroy_light(es_world* world, es_light light);
+ES_API es_result es_world_destroy_clip(es_world* world, es_clip clip);
+
+typedef enum es_object_kind { ES_OBJECT_TEXTURE, ES_OBJECT_MATERIAL, ES_OBJECT_MESH, ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_KINDS } es_object_kind;
+/* Handles of all objects of a kind in creation-slot order; *count is the capacity in, the number of objects out; ids NULL asks for it. */
+ES_API es_result es_world_enumerate(const es_world* world, es_object_kind kind, uint32_t* ids, size_t* count);
+/* "" when unnamed; NULL for a stale handle. */
+ES_API const char* es_world_name(const es_world* world, es_object_kind kind, uint32_t id);
+
+/* ---- what the light reads ---------------------------------------------------------------------------------------------------------------------------- */
+
+/* Visible instances in slot order, with their transforms now and last frame; G-buffer id = slot index. */
+ES_API const es_draw_list* es_world_draw_list(const es_world* world);
+
+typedef struct es_light_state {
+    es_light handle;
+    es_light_type type;
+    es_vec3 position, direction;      /* direction: the way the light travels along its axis, unit */
+    float radiant[3];                 /* color × intensity: W/sr, or W/m² for directional */
+    float cos_inner, cos_outer;       /* spot */
+    float range;
+} es_light_state;
+/* Lights that are on and not black, in slot order. */
+ES_API const es_light_state* es_world_lights(const es_world* world, size_t* count);
+
+/* Each number goes up when something of its kind changes; equal numbers mean the same content, bit for bit. */
+typedef struct es_world_revisions {
+    uint64_t geometry;    /* transforms, meshes, instances */
+    uint64_t materials;   /* materials and textures */
+    uint64_t lights;
+    uint64_t camera;      /* active camera: which, its pose, its lens */
+    bool moving;          /* some previous transform, vertex or view differs from the present one */
+} es_world_revisions;
+ES_API es_world_revisions es_world_get_revisions(const es_world* world);
+/* World-space bounds of everything visible; false when there is nothing. */
+ES_API bool es_world_bounds(const es_world* world, es_vec3* minimum, es_vec3* maximum);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
