@@ -1,0 +1,58 @@
+/* The renderer's settings: names, ranges, defaults. What a number means and where it comes from stands in gi.h. */
+#include "gi/gi.h"
+#include "platform/settings.h"
+
+#define AT(field) offsetof(es_renderer_settings, field)
+
+static const es_setting renderer_table[] = {
+    {"width", ES_SETTING_INT, "1024", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(width)},
+    {"height", ES_SETTING_INT, "768", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(height)},
+    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic", "indirect light: none, imperfect shadow maps, or an accurate map per light", AT(method)},
+    {"skip", ES_SETTING_BOOL, "true", 0, 1, NULL, "skip work whose result would be the same bits", AT(skip)},
+    {"bounces", ES_SETTING_INT, "1", 0, 1, NULL, "indirect bounces", AT(bounces)},
+
+    {"shadow.size", ES_SETTING_INT, "1024", 16, 8192, NULL, "texels of a shadow map's side", AT(shadow_size)},
+    {"shadow.bias", ES_SETTING_FLOAT, "0.5", 0, 64, NULL, "constant depth bias, texels", AT(shadow_bias)},
+    {"shadow.slope-bias", ES_SETTING_FLOAT, "1.0", 0, 64, NULL, "slope-scaled depth bias, texels", AT(shadow_slope_bias)},
+    {"shadow.filter", ES_SETTING_INT, "2", 1, 7, NULL, "percentage-closer filter, taps per side", AT(shadow_filter)},
+
+    {"vpl.count", ES_SETTING_INT, "1024", 0, 16384, NULL, "virtual point lights per frame", AT(vpls)},
+    {"vpl.light-size", ES_SETTING_INT, "256", 8, 2048, NULL, "texels of a light G-buffer's side, a power of two", AT(light_size)},
+    {"vpl.seed", ES_SETTING_INT, "0", 0, 1000000, NULL, "offset into the Halton sequence", AT(seed)},
+    {"vpl.bound", ES_SETTING_FLOAT, "20", 0.001, 1000000, NULL, "largest geometry term cos cos / d², 1/m²", AT(geometry_bound)},
+    {"vpl.glossy", ES_SETTING_BOOL, "true", 0, 1, NULL, "virtual point lights emit their surface's glossy lobe too", AT(glossy_vpls)},
+
+    {"ism.size", ES_SETTING_INT, "128", 32, 256, NULL, "texels of an imperfect shadow map's side: 32, 64, 128 or 256", AT(ism_size)},
+    {"ism.points", ES_SETTING_INT, "8192", 64, 65536, NULL, "points drawn into each map, a multiple of 64", AT(ism_points)},
+    {"ism.pool", ES_SETTING_INT, "1048576", 64, 16777216, NULL, "points that stand for the scene", AT(ism_pool)},
+    {"ism.pull-push", ES_SETTING_BOOL, "true", 0, 1, NULL, "fill the holes between points", AT(pull_push)},
+    {"ism.pull-threshold", ES_SETTING_FLOAT, "0.05", 0, 1, NULL, "largest depth difference that is averaged, share of the scene's extent", AT(pull_threshold)},
+    {"ism.push-threshold", ES_SETTING_FLOAT, "0.05", 0, 1, NULL, "largest depth difference that is kept, share of the scene's extent", AT(push_threshold)},
+    {"ism.levels", ES_SETTING_INT, "2", 1, 4, NULL, "pull-push levels", AT(pull_push_levels)},
+    {"ism.bias", ES_SETTING_FLOAT, "0.01", 0, 1, NULL, "depth bias of the visibility test, share of the scene's extent", AT(ism_bias)},
+    {"classic.size", ES_SETTING_INT, "256", 32, 1024, NULL, "texels of a classic map's side, a power of two", AT(classic_size)},
+
+    {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
+    {"filter", ES_SETTING_BOOL, "true", 0, 1, NULL, "geometry-aware filter over the pattern", AT(filter)},
+    {"filter.depth", ES_SETTING_FLOAT, "0.03", 0, 1, NULL, "largest relative depth difference the filter crosses", AT(filter_depth)},
+    {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
+
+    {"tone-map", ES_SETTING_CHOICE, "reinhard", 0, 0, "reinhard|pbr-neutral|linear", "display transform", AT(tone_map)},
+    {"exposure", ES_SETTING_FLOAT, "0", -20, 20, NULL, "stops", AT(exposure)},
+};
+
+size_t es_renderer_setting_count(void) { return sizeof renderer_table / sizeof renderer_table[0]; }
+
+const es_setting* es_renderer_setting(size_t index) { return index < es_renderer_setting_count() ? &renderer_table[index] : NULL; }
+
+es_renderer_settings es_default_renderer_settings(void)
+{
+    es_renderer_settings settings = {0};
+    es_settings_defaults(renderer_table, es_renderer_setting_count(), &settings);
+    return settings;
+}
+
+es_result es_renderer_settings_set(es_context* context, es_renderer_settings* settings, const char* name, const char* value)
+{
+    return es_settings_set(context, renderer_table, es_renderer_setting_count(), settings, name, value);
+}
