@@ -1,0 +1,282 @@
+#include "gi/vpl_sampling.h"
+
+#include "platform/context.h"
+#include "platform/maths.h"
+#include "platform/random.h"
+#include "raster/pack.h"
+
+static float luminance(es_vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+
+typedef struct texel_surface {
+    es_vec3 base_color;
+    float metallic, roughness, specular;
+    uint32_t model;
+} texel_surface;
+
+static texel_surface surface_at(const es_gbuffer* gbuffer, size_t at)
+{
+    uint32_t rg = gbuffer->albedo_rg[at], b = gbuffer->albedo_b[at], s = gbuffer->surface[at];
+    const float unit = 1.0f / 65535.0f, byte = 1.0f / 255.0f;
+    texel_surface t = {
+        .base_color = es_v3((float)(rg & 0xffff) * unit, (float)(rg >> 16) * unit, (float)(b & 0xffff) * unit),
+        .metallic = (float)(s & 0xff) * byte,
+        .roughness = (float)(s >> 8 & 0xff) * byte,
+        .specular = (float)(s >> 16 & 0xff) * byte,
+        .model = s >> 24,
+    };
+    if (t.model == ES_SURFACE_PHONG) t.roughness = (float)(s >> 8 & 0xff) * 0.2f; /* the exponent */
+    return t;
+}
+
+/* Power that a face's texel receives per unit of the light's intensity: solid angle (perspective, sr) or area (orthographic, m²),
+ * times the falloff. A perspective texel at tangent coordinates (a, b) spans step² / (1 + a² + b²)^(3/2). */
+static float texel_share(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float depth)
+{
+    const es_pixel_rays* rays = &face->gbuffer_rays;
+    if (view->orthographic) {
+        es_vec3 dx = es_v3(rays->base_dx[0], rays->base_dx[1], rays->base_dx[2]), dy = es_v3(rays->base_dy[0], rays->base_dy[1], rays->base_dy[2]);
+        return es_v3_length(dx) * es_v3_length(dy);
+    }
+    es_vec3 d = es_pixel_rays_direction(rays, (float)x, (float)y);
+    es_vec3 dx = es_v3(rays->dir_dx[0], rays->dir_dx[1], rays->dir_dx[2]), dy = es_v3(rays->dir_dy[0], rays->dir_dy[1], rays->dir_dy[2]);
+    float length = es_v3_length(d);
+    float solid_angle = es_sqrt(es_v3_dot(dx, dx) * es_v3_dot(dy, dy)) / (length * length * length);
+    return solid_angle * es_light_falloff(&view->light, es_v3_scale(d, 1.0f / length), depth * length);
+}
+
+typedef struct importance_job { const es_light_view* view; es_importance* importance; } importance_job;
+
+static void importance_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    importance_job* job = user;
+    uint32_t size = job->importance->size;
+    es_vec3 light = es_v3(job->view->light.radiant[0], job->view->light.radiant[1], job->view->light.radiant[2]);
+    for (uint32_t row = begin; row < end; row++) {
+        uint32_t f = row / size, y = row % size;
+        const es_light_face* face = &job->view->faces[f];
+        float* out = job->importance->sums + f * job->importance->face_floats + (size_t)y * size;
+        for (uint32_t x = 0; x < size; x++) {
+            size_t at = (size_t)y * face->gbuffer.stride + x;
+            float depth = face->gbuffer.depth[at], value = 0.0f;
+            if (depth > 0.0f) {
+                texel_surface surface = surface_at(&face->gbuffer, at);
+                if (surface.model != ES_SURFACE_UNLIT) {
+                    /* eq. 4.3, SP taken as 1 - roughness (GGX) or exponent / 50 (Phong): 0 diffuse … 1 mirror-like */
+                    float power = surface.model == ES_SURFACE_PHONG ? surface.roughness * 0.02f * surface.specular : (1.0f - surface.roughness) * es_maxf(surface.metallic, surface.specular * 0.04f);
+                    value = texel_share(job->view, face, x, y, depth) * luminance(es_v3_mul(surface.base_color, light)) * (0.5f + power);
+                }
+            }
+            out[x] = value;
+        }
+    }
+}
+
+es_result es_importance_build(es_context* context, es_importance* importance, const es_light_view* view)
+{
+    uint32_t size = view->faces[0].gbuffer.width;
+    if (importance->size != size || importance->face_count != view->face_count) {
+        es_importance_free(context, importance);
+        size_t total = 0;
+        uint32_t levels = 0;
+        for (uint32_t s = size; s >= 1; s /= 2) {
+            importance->level_offset[levels++] = total;
+            total += (size_t)s * s;
+        }
+        importance->sums = es_allocate_array(context, total * view->face_count, sizeof(float));
+        if (!importance->sums) return es_context_last_result(context);
+        importance->size = size;
+        importance->level_count = levels;
+        importance->face_count = view->face_count;
+        importance->face_floats = total;
+    }
+    importance_job job = {view, importance};
+    es_parallel_for(context, size * view->face_count, 8, importance_rows, &job);
+    for (uint32_t f = 0; f < view->face_count; f++) {
+        float* sums = importance->sums + f * importance->face_floats;
+        for (uint32_t l = 1; l < importance->level_count; l++) {
+            uint32_t s = size >> l;
+            const float* fine = sums + importance->level_offset[l - 1];
+            float* coarse = sums + importance->level_offset[l];
+            for (uint32_t y = 0; y < s; y++)
+                for (uint32_t x = 0; x < s; x++) {
+                    const float* p = fine + (size_t)(2 * y) * (2 * s) + 2 * x;
+                    coarse[(size_t)y * s + x] = (p[0] + p[1]) + (p[2 * s] + p[2 * s + 1]);
+                }
+        }
+    }
+    return ES_OK;
+}
+
+void es_importance_free(es_context* context, es_importance* importance)
+{
+    if (importance->sums) es_release(context, importance->sums, importance->face_floats * importance->face_count * sizeof(float));
+    *importance = (es_importance){0};
+}
+
+/* Splits [0, 1) at `share`, says on which side u lies and stretches that side back to [0, 1). */
+static bool split(float* u, float share)
+{
+    const float below_one = 0.99999994f;
+    if (*u < share) {
+        *u = es_minf(*u / share, below_one);
+        return false;
+    }
+    *u = es_minf((*u - share) / (1.0f - share), below_one);
+    return true;
+}
+
+bool es_importance_warp(const es_importance* importance, float u, float v, uint32_t* face, uint32_t* x, uint32_t* y, float* probability)
+{
+    float total = 0.0f, top[6];
+    for (uint32_t f = 0; f < importance->face_count; f++) {
+        top[f] = importance->sums[f * importance->face_floats + importance->level_offset[importance->level_count - 1]];
+        total += top[f];
+    }
+    if (!(total > 0.0f)) return false;
+    /* several faces: one more splitting step, along u */
+    float left = total;
+    uint32_t f = 0;
+    for (; f + 1 < importance->face_count; f++) {
+        if (top[f] > 0.0f && (left <= top[f] || !split(&u, top[f] / left))) break;
+        left -= top[f];
+    }
+    while (!(top[f] > 0.0f)) f = f ? f - 1 : importance->face_count - 1; /* rounding led past the last lit face */
+
+    const float* sums = importance->sums + f * importance->face_floats;
+    uint32_t cx = 0, cy = 0;
+    for (int l = (int)importance->level_count - 2; l >= 0; l--) {
+        uint32_t size = importance->size >> l;
+        const float* p = sums + importance->level_offset[l] + (size_t)(2 * cy) * size + 2 * cx;
+        float upper = p[0] + p[1], lower = p[size] + p[size + 1];
+        uint32_t row = !(lower > 0.0f) ? 0 : !(upper > 0.0f) ? 1 : (uint32_t)split(&v, upper / (upper + lower));
+        const float* q = p + (row ? size : 0);
+        uint32_t column = !(q[1] > 0.0f) ? 0 : !(q[0] > 0.0f) ? 1 : (uint32_t)split(&u, q[0] / (q[0] + q[1]));
+        cx = 2 * cx + column;
+        cy = 2 * cy + row;
+    }
+    *face = f;
+    *x = cx;
+    *y = cy;
+    *probability = sums[(size_t)cy * importance->size + cx] / total;
+    return *probability > 0.0f;
+}
+
+/* A lobe is worth evaluating when its peak, F0 / (4 α²) for GGX, is a tenth of a white diffuse surface's or more. */
+static bool has_lobe(const texel_surface* surface, es_vec3 f0)
+{
+    if (surface->model == ES_SURFACE_PHONG) return surface->specular > 0.0f;
+    float alpha = surface->roughness * surface->roughness;
+    return luminance(f0) > 0.1f * 4.0f * alpha * alpha;
+}
+
+static void make_record(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float weight, bool glossy, es_vpl_record* record)
+{
+    const es_gbuffer* gbuffer = &face->gbuffer;
+    size_t at = (size_t)y * gbuffer->stride + x;
+    float depth = gbuffer->depth[at];
+    es_vec3 position = es_pixel_rays_position(&face->gbuffer_rays, (float)x, (float)y, depth);
+    es_vec3 normal = es_unpack_normal(gbuffer->normal[at]), tangent, bitangent;
+    es_orthonormal_basis(normal, &tangent, &bitangent);
+    es_vec3 incident = view->orthographic ? es_v3_scale(view->light.direction, -1.0f) : es_v3_normalize(es_v3_sub(view->light.position, position), normal);
+    texel_surface surface = surface_at(gbuffer, at);
+    float share = texel_share(view, face, x, y, depth) * weight;
+    es_vec3 power = es_v3_scale(es_v3(view->light.radiant[0], view->light.radiant[1], view->light.radiant[2]), share);
+    es_vec3 f0, diffuse;
+    if (surface.model == ES_SURFACE_PHONG) {
+        f0 = es_v3(surface.specular, surface.specular, surface.specular);
+        diffuse = surface.base_color;
+    } else {
+        float dielectric = 0.04f * surface.specular * (1.0f - surface.metallic);
+        f0 = es_v3_add(es_v3_scale(surface.base_color, surface.metallic), es_v3(dielectric, dielectric, dielectric));
+        diffuse = es_v3_scale(surface.base_color, 1.0f - surface.metallic);
+    }
+    es_vec3 flux = es_v3_mul(power, diffuse);
+    *record = (es_vpl_record){
+        .position = {position.x, position.y, position.z},
+        .normal = {normal.x, normal.y, normal.z},
+        .tangent = {tangent.x, tangent.y, tangent.z},
+        .bitangent = {bitangent.x, bitangent.y, bitangent.z},
+        .flux = {flux.x, flux.y, flux.z},
+        .power = {power.x, power.y, power.z},
+        .incident = {incident.x, incident.y, incident.z},
+        .specular_color = {f0.x, f0.y, f0.z},
+        .roughness = surface.roughness,
+        .model = surface.model,
+        .glossy = glossy && has_lobe(&surface, f0),
+    };
+}
+
+/* VPLs of each light by emitted power: rounded down, the remainder to the lights in order. */
+static void share_out(const es_light_view* views, uint32_t view_count, uint32_t count, uint32_t* shares)
+{
+    double total = 0.0;
+    for (uint32_t i = 0; i < view_count; i++) total += views[i].power;
+    uint32_t given = 0;
+    for (uint32_t i = 0; i < view_count; i++) {
+        shares[i] = total > 0.0 ? (uint32_t)((double)count * views[i].power / total) : 0;
+        given += shares[i];
+    }
+    for (uint32_t i = 0; given < count && i < view_count; i = (i + 1) % view_count, given++)
+        if (views[i].power > 0.0f) shares[i]++;
+        else given--;
+}
+
+es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32_t view_count, const es_importance* importances, const es_vpl_request* request,
+    es_vpl_record* records, uint32_t* count)
+{
+    *count = 0;
+    double total_power = 0.0;
+    for (uint32_t i = 0; i < view_count; i++) total_power += views[i].power;
+    if (!(total_power > 0.0) || !request->count) return ES_OK;
+
+    uint32_t* shares = es_allocate_array(context, view_count, sizeof *shares);
+    uint32_t* next = es_allocate_array(context, view_count, sizeof *next);
+    if (!shares || !next) {
+        if (shares) es_release(context, shares, view_count * sizeof *shares);
+        if (next) es_release(context, next, view_count * sizeof *next);
+        return es_context_last_result(context);
+    }
+    share_out(views, view_count, request->count, shares);
+    uint32_t drawn = 0;
+    for (uint32_t i = 0; i < view_count; i++) {
+        next[i] = 0;
+        float total = 0.0f;
+        for (uint32_t f = 0; f < importances[i].face_count; f++)
+            total += importances[i].sums[f * importances[i].face_floats + importances[i].level_offset[importances[i].level_count - 1]];
+        if (!(total > 0.0f)) shares[i] = 0; /* lights nothing */
+        drawn += shares[i];
+    }
+
+    /* Samples of all lights in the order of (i + ½) / share: each subset, a run of this order, has its share of every light.
+     * The k-th of subset s becomes record s + k · subsets; the first drawn % subsets subsets have one more. */
+    uint32_t subset = 0, in_subset = 0;
+    for (uint32_t made = 0; made < drawn; made++) {
+        uint32_t chosen = 0;
+        float lowest = 2.0f;
+        for (uint32_t i = 0; i < view_count; i++) {
+            if (next[i] >= shares[i]) continue;
+            float key = ((float)next[i] + 0.5f) / (float)shares[i];
+            if (key < lowest) {
+                lowest = key;
+                chosen = i;
+            }
+        }
+        uint32_t index = request->seed + next[chosen]++;
+        uint32_t face, x, y;
+        float probability;
+        uint32_t size_of_subset = drawn / request->subsets + (subset < drawn % request->subsets);
+        while (size_of_subset == 0 || in_subset >= size_of_subset) {
+            subset++;
+            in_subset = 0;
+            size_of_subset = drawn / request->subsets + (subset < drawn % request->subsets);
+        }
+        es_vpl_record* record = &records[subset + in_subset++ * request->subsets];
+        /* the sequence's first point is the origin itself: start at 1 */
+        es_importance_warp(&importances[chosen], es_halton(0, index + 1), es_halton(1, index + 1), &face, &x, &y, &probability);
+        make_record(&views[chosen], &views[chosen].faces[face], x, y, 1.0f / (probability * (float)shares[chosen]), request->glossy, record);
+    }
+    *count = drawn;
+    es_release(context, shares, view_count * sizeof *shares);
+    es_release(context, next, view_count * sizeof *next);
+    return ES_OK;
+}

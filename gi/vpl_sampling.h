@@ -1,0 +1,35 @@
+/* From the lights' G-buffers to a set of virtual point lights (Knecht §3.3, §4.3, §4.4). */
+#ifndef EARTHSHINE_GI_VPL_SAMPLING_H
+#define EARTHSHINE_GI_VPL_SAMPLING_H
+
+#include "gi/light_view.h"
+#include "gi/vpl.h"
+
+/* Sums of importance over a square of texels, one pyramid per face: level 0 is the finest, each coarser cell the sum of four. */
+typedef struct es_importance {
+    uint32_t size, level_count, face_count;
+    size_t level_offset[16];
+    size_t face_floats;
+    float* sums;          /* face_count × face_floats */
+} es_importance;
+
+es_result es_importance_build(es_context* context, es_importance* importance, const es_light_view* view);
+void es_importance_free(es_context* context, es_importance* importance);
+
+/* Hierarchical warping (Clarberg et al. 2005, as Knecht §3.3 uses it) of a point of the unit square: the texel it falls on and
+ * the probability of that texel. False when all importance is zero. */
+bool es_importance_warp(const es_importance* importance, float u, float v, uint32_t* face, uint32_t* x, uint32_t* y, float* probability);
+
+typedef struct es_vpl_request {
+    uint32_t count;       /* over all lights, shared out by emitted power */
+    uint32_t seed;        /* offset into the Halton sequence */
+    uint32_t subsets;     /* n² of the interleaved pattern: record v belongs to subset v % subsets */
+    bool glossy;
+} es_vpl_request;
+
+/* Fills at most request->count records; *count says how many. Consecutive Halton points share a subset (each run of them covers
+ * the light's view evenly), so a subset is itself a good sample set. */
+es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32_t view_count, const es_importance* importances, const es_vpl_request* request,
+    es_vpl_record* records, uint32_t* count);
+
+#endif
