@@ -1,0 +1,108 @@
+#!/usr/bin/env bash
+# The same frames, bit for bit: every image of frame_hashes for 1, 2, 3 and 8 threads on every instruction set at hand, and
+# without skipping, against one thread of scalar code.
+#
+# usage: determinism.sh BUILD_DIR SOURCE_DIR           this build alone
+#        determinism.sh BUILD_DIR SOURCE_DIR matrix    and builds by {gcc, clang} at {-O1, -O3} without the optional libraries,
+#                                                      and one for aarch64 under qemu-user, in BUILD_DIR/determinism
+# Ends with "N compared, N different".
+set -u
+build=$1
+source=$2
+matrix=${3:-}
+work=$build/determinism
+mkdir -p "$work"
+compared=0
+different=0
+reference=$work/reference.txt
+skipped_one=
+
+# compare NAME COMMAND…: the command's lines against the reference's
+compare()
+{
+    local name=$1
+    shift
+    compared=$((compared + 1))
+    if ! "$@" >"$work/lines.txt" 2>"$work/errors.txt"; then
+        different=$((different + 1))
+        echo "FAILED: $name: $(tail -n 1 "$work/errors.txt")"
+    elif ! grep -E "^(${scenes// /|}) " "$reference" | cmp -s - "$work/lines.txt"; then
+        different=$((different + 1))
+        echo "FAILED: $name differs in (scene frame image):"
+        grep -E "^(${scenes// /|}) " "$reference" | diff - "$work/lines.txt" | sed -n 's/^> \(.*\) [0-9a-f]*$/    \1/p' | head -n 12
+    fi
+}
+
+# every_way NAME PROGRAM THREADS…: all instruction sets with each of the numbers of threads, then without skipping
+every_way()
+{
+    local name=$1 program=$2 isa threads
+    shift 2
+    for isa in $($program --isas); do
+        for threads in "$@"; do
+            # shellcheck disable=SC2086
+            compare "$name, $isa, $threads threads" $program --isa $isa --threads $threads $scenes
+        done
+    done
+    # shellcheck disable=SC2086
+    compare "$name, --no-skip" $program --no-skip $scenes
+}
+
+# shellcheck disable=SC2086
+configure_and_build()
+{
+    local folder=$1
+    shift
+    if ! cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DEARTHSHINE_TESTS=ON -DEARTHSHINE_DEMOS=OFF \
+        -DEARTHSHINE_WITH_OPENEXR=OFF -DEARTHSHINE_WITH_PNG=OFF -DEARTHSHINE_WITH_GLFW=OFF -DEARTHSHINE_WITH_TINYGLTF=OFF \
+        "$@" >"$folder.log" 2>&1 || ! cmake --build "$folder" --target frame_hashes >>"$folder.log" 2>&1; then
+        compared=$((compared + 1))
+        different=$((different + 1))
+        echo "FAILED: the build in $folder: $(grep -m 1 -iE 'error' "$folder.log" || tail -n 1 "$folder.log")"
+        return 1
+    fi
+}
+
+scenes="cornell room hall parts"
+# shellcheck disable=SC2086
+if ! "$build/frame_hashes" --isa scalar --threads 1 $scenes >"$reference"; then
+    echo "FAILED: frame_hashes itself"
+    exit 1
+fi
+
+if [ -z "$matrix" ]; then
+    every_way "this build" "$build/frame_hashes" 1 2 3 8
+else
+    for compiler in gcc clang; do
+        cxx=${compiler/gcc/g++}
+        [ $compiler = clang ] && cxx=clang++
+        if ! command -v $compiler >/dev/null || ! command -v $cxx >/dev/null; then
+            echo "skipped: $compiler is not installed"
+            skipped_one=1
+            continue
+        fi
+        for level in -O1 -O3; do
+            folder=$work/$compiler$level
+            if configure_and_build "$folder" -DCMAKE_C_COMPILER=$compiler -DCMAKE_CXX_COMPILER=$cxx -DEARTHSHINE_OPTIMIZE=$level; then
+                every_way "$compiler $level" "$folder/frame_hashes" 1 2 3 8
+            fi
+        done
+    done
+
+    # An emulated processor is some thirty times slower: two scenes, and neither 2 nor 8 threads.
+    if command -v aarch64-linux-gnu-gcc >/dev/null && command -v aarch64-linux-gnu-g++ >/dev/null && command -v qemu-aarch64 >/dev/null; then
+        folder=$work/aarch64
+        if configure_and_build "$folder" -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
+            -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++; then
+            scenes="cornell parts"
+            every_way "aarch64" "qemu-aarch64 -L /usr/aarch64-linux-gnu $folder/frame_hashes" 1 3
+        fi
+    else
+        echo "skipped: aarch64 needs aarch64-linux-gnu-gcc, aarch64-linux-gnu-g++ and qemu-aarch64"
+        skipped_one=1
+    fi
+fi
+
+[ -n "$skipped_one" ] && echo "some of the matrix was skipped"
+echo "$compared compared, $different different"
+[ $different -eq 0 ]

@@ -1,0 +1,381 @@
+/* Prints the hash of every image of a few small frames, one per line: SCENE FRAME IMAGE HASH.
+ *
+ * The same lines must come out for any number of threads, instruction set, compiler and optimisation level, and with or
+ * without skipping: tests/determinism.sh compares them; tests/goldens.sh compares them with tests/goldens.txt, so that a
+ * change names the image it reached. The built-in scenes are drawn with few triangles; `parts` is a world made here, of what
+ * those lack: point and directional light, textures, alpha mask, mirrored instances, Phong and unlit surfaces, a deformed mesh.
+ *
+ * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
+ * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps.
+ *
+ * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [SCENE …], or frame_hashes --isas: the instruction sets at hand
+ */
+#include <earthshine/gi.h>
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void stop(const es_context* context, const char* what)
+{
+    fprintf(stderr, "frame_hashes: %s failed: %s\n", what, context ? es_context_message(context) : "");
+    exit(1);
+}
+
+static void check(const es_context* context, es_result result, const char* what)
+{
+    if (result != ES_OK) stop(context, what);
+}
+
+/* ---- the world of parts ------------------------------------------------------------------------------------------------ */
+
+enum { GRID = 12, FACE_VERTICES = (GRID + 1) * (GRID + 1), SPHERE_VERTICES = 6 * FACE_VERTICES, SPHERE_TRIANGLES = 6 * GRID * GRID * 2 };
+
+typedef struct sphere {
+    float positions[SPHERE_VERTICES * 3], uvs[SPHERE_VERTICES * 2], colors[SPHERE_VERTICES * 4];
+    uint32_t indices[SPHERE_TRIANGLES * 3];
+} sphere;
+
+/* A cube's six gridded faces drawn out to the unit sphere: only sqrt, so the vertices are the same everywhere. */
+static void make_sphere(sphere* s)
+{
+    static const float axes[6][3][3] = {
+        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},  {{-1, 0, 0}, {0, 0, 1}, {0, 1, 0}}, {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}},
+        {{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}, {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}},  {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}}};
+    uint32_t vertex = 0, index = 0;
+    for (int face = 0; face < 6; face++) {
+        uint32_t first = vertex;
+        for (int j = 0; j <= GRID; j++) {
+            for (int i = 0; i <= GRID; i++, vertex++) {
+                float u = (float)i / GRID * 2 - 1, v = (float)j / GRID * 2 - 1;
+                float scale = 1.0f / sqrtf(1.0f + u * u + v * v);
+                for (int k = 0; k < 3; k++)
+                    s->positions[3 * vertex + k] = (axes[face][0][k] + axes[face][1][k] * u + axes[face][2][k] * v) * scale;
+                s->uvs[2 * vertex] = (float)i / GRID * 1.5f;
+                s->uvs[2 * vertex + 1] = (float)j / GRID * 1.5f;
+                for (int k = 0; k < 4; k++) s->colors[4 * vertex + k] = k < 3 ? 0.5f + 0.5f * (float)((face >> k) & 1) : 1.0f;
+            }
+        }
+        for (uint32_t j = 0; j < GRID; j++) {
+            for (uint32_t i = 0; i < GRID; i++) {
+                uint32_t a = first + j * (GRID + 1) + i, b = a + 1, c = a + GRID + 1, d = c + 1;
+                const uint32_t corners[6] = {a, b, d, a, d, c};
+                memcpy(s->indices + index, corners, sizeof corners);
+                index += 6;
+            }
+        }
+    }
+}
+
+typedef struct parts {
+    es_node ball, lamp;
+    es_mesh mesh;
+    sphere shape;
+} parts;
+
+static void move_parts(es_world* world, void* user, double time, float dt)
+{
+    parts* p = user;
+    es_context* context = es_world_context(world);
+    float t = (float)time;
+    es_transform transform;
+    check(context, es_world_get_node_transform(world, p->ball, &transform), "reading a node");
+    transform.translation.x = -0.8f + 1.5f * t;
+    check(context, es_world_set_node_transform(world, p->ball, &transform), "moving a node");
+    check(context, es_world_get_node_transform(world, p->lamp, &transform), "reading the lamp's node");
+    transform.translation.z = 0.6f - t;
+    check(context, es_world_set_node_transform(world, p->lamp, &transform), "moving the lamp");
+    float* positions = malloc(sizeof p->shape.positions);
+    if (!positions) stop(context, "memory");
+    for (uint32_t i = 0; i < SPHERE_VERTICES; i++) {
+        const float* from = p->shape.positions + 3 * i;
+        float squeeze = 1.0f + 0.5f * t * from[1];
+        positions[3 * i] = from[0] * squeeze;
+        positions[3 * i + 1] = from[1];
+        positions[3 * i + 2] = from[2] * squeeze;
+    }
+    check(context, es_world_deform_mesh(world, p->mesh, positions, NULL), "deforming a mesh");
+    free(positions);
+}
+
+static es_node add_node(es_world* world, const char* name, es_vec3 at, es_quat rotation, es_vec3 scale)
+{
+    es_node node;
+    es_node_desc desc = {.name = name, .transform = {at, rotation, scale}};
+    check(es_world_context(world), es_world_add_node(world, &desc, &node), "adding a node");
+    return node;
+}
+
+static void add_instance(es_world* world, es_node node, es_mesh mesh, es_material material)
+{
+    es_instance instance;
+    es_instance_desc desc = {.node = node, .mesh = mesh, .material = material};
+    check(es_world_context(world), es_world_add_instance(world, &desc, &instance), "adding an instance");
+}
+
+static es_material add_material(es_world* world, const char* name, const es_material_desc* desc)
+{
+    es_material material;
+    check(es_world_context(world), es_world_add_material(world, name, desc, &material), "adding a material");
+    return material;
+}
+
+static const es_quat upright = {0, 0, 0, 1};
+
+static void make_parts(es_context* context, const es_world_settings* settings, es_world** result, parts* p)
+{
+    es_world* world;
+    check(context, es_world_create(context, settings, &world), "creating a world");
+    *result = world;
+    make_sphere(&p->shape);
+
+    /* a picture of 48 × 32 texels, not powers of two: colours in squares, alpha in stripes */
+    enum { WIDTH = 48, HEIGHT = 32 };
+    static const uint8_t levels[4] = {40, 110, 180, 250};
+    uint8_t* rgba = malloc(WIDTH * HEIGHT * 4);
+    if (!rgba) stop(context, "memory");
+    for (uint32_t y = 0; y < HEIGHT; y++) {
+        for (uint32_t x = 0; x < WIDTH; x++) {
+            uint8_t* texel = rgba + 4 * (y * WIDTH + x);
+            texel[0] = levels[(x / 8 + y / 8) & 3];
+            texel[1] = levels[(x / 4) & 3];
+            texel[2] = levels[(y / 4) & 3];
+            texel[3] = (x / 6) & 1 ? 255 : 20;
+        }
+    }
+    es_texture colors, bumps;
+    es_texture_desc texture = {.name = "colours", .width = WIDTH, .height = HEIGHT, .rgba = rgba, .srgb = true};
+    check(context, es_world_add_texture(world, &texture, &colors), "adding a texture");
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+        uint8_t* texel = rgba + 4 * i;
+        texel[0] = (uint8_t)(96 + 64 * ((i / 5) & 1));
+        texel[1] = (uint8_t)(96 + 64 * ((i / (WIDTH * 5)) & 1));
+        texel[2] = 240;
+        texel[3] = 255;
+    }
+    texture.name = "bumps";
+    texture.srgb = false;
+    check(context, es_world_add_texture(world, &texture, &bumps), "adding a texture");
+    free(rgba);
+
+    es_texture_use use = {.image = es_world_texture_image(world, colors)};
+    es_material_desc desc = es_default_material_desc();
+    desc.base_color_texture = use;
+    desc.normal_texture = use;
+    desc.normal_texture.image = es_world_texture_image(world, bumps);
+    desc.normal_texture.wrap_u = ES_WRAP_MIRROR;
+    desc.roughness = 0.6f;
+    es_material ground = add_material(world, "ground", &desc);
+
+    desc = es_default_material_desc();
+    desc.base_color_texture = use;
+    desc.base_color_texture.magnify = ES_FILTER_NEAREST;
+    desc.base_color_texture.wrap_v = ES_WRAP_CLAMP;
+    desc.alpha_mask = true;
+    desc.double_sided = true;
+    es_material fence = add_material(world, "fence", &desc);
+
+    desc = es_default_material_desc();
+    desc.model = ES_SURFACE_PHONG;
+    desc.base_color[1] = 0.3f;
+    desc.base_color[2] = 0.2f;
+    desc.specular = 0.4f;
+    desc.exponent = 30;
+    es_material phong = add_material(world, "phong", &desc);
+
+    desc = es_default_material_desc();
+    desc.metallic = 1;
+    desc.roughness = 0.35f;
+    desc.base_color[2] = 0.4f;
+    es_material metal = add_material(world, "metal", &desc);
+
+    desc = es_default_material_desc();
+    desc.model = ES_SURFACE_UNLIT;
+    desc.base_color[0] = 0.1f;
+    desc.emission[1] = 0.5f;
+    es_material unlit = add_material(world, "unlit", &desc);
+
+    es_mesh_desc ball = {.name = "ball", .vertex_count = SPHERE_VERTICES, .triangle_count = SPHERE_TRIANGLES,
+        .positions = p->shape.positions, .uv0 = p->shape.uvs, .colors = p->shape.colors, .indices = p->shape.indices};
+    es_mesh steady;
+    check(context, es_world_add_mesh(world, &ball, &p->mesh), "adding a mesh");
+    ball.name = "facets";
+    ball.flat_normals = true;
+    ball.colors = NULL;
+    check(context, es_world_add_mesh(world, &ball, &steady), "adding a mesh");
+    static const float corners[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1}, uvs[8] = {0, 2, 3, 2, 3, 0, 0, 0};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    es_mesh_desc square = {.name = "square", .vertex_count = 4, .triangle_count = 2, .positions = corners, .uv0 = uvs, .indices = indices};
+    es_mesh plane;
+    check(context, es_world_add_mesh(world, &square, &plane), "adding a mesh");
+
+    const float half = sqrtf(0.5f);
+    const es_vec3 one = {1, 1, 1};
+    add_instance(world, add_node(world, "ground", (es_vec3){0, 0, 0}, upright, (es_vec3){3, 1, 3}), plane, ground);
+    add_instance(world, add_node(world, "wall", (es_vec3){0, 1.5f, -2}, (es_quat){half, 0, 0, half}, (es_vec3){3, 1, 1.5f}), plane, phong);
+    add_instance(world, add_node(world, "fence", (es_vec3){1.2f, 0.7f, 0.4f}, (es_quat){0, 0, half, half}, (es_vec3){0.7f, 1, 0.9f}), plane, fence);
+    p->ball = add_node(world, "ball", (es_vec3){-0.8f, 0.6f, 0}, upright, (es_vec3){0.6f, 0.6f, 0.6f});
+    add_instance(world, p->ball, p->mesh, phong);
+    add_instance(world, add_node(world, "mirrored", (es_vec3){0.5f, 0.5f, -0.8f}, upright, (es_vec3){-0.5f, 0.5f, 0.5f}), steady, metal);
+    add_instance(world, add_node(world, "sign", (es_vec3){-1.6f, 0.3f, 0.8f}, upright, (es_vec3){0.2f, 0.3f, 0.2f}), steady, unlit);
+
+    es_light_desc light = es_default_light_desc();
+    es_light added;
+    light.name = "lamp";
+    light.type = ES_LIGHT_POINT;
+    light.intensity = 6;
+    light.color[2] = 0.6f;
+    light.node = p->lamp = add_node(world, "lamp", (es_vec3){0.2f, 2.2f, 0.6f}, upright, one);
+    check(context, es_world_add_light(world, &light, &added), "adding a light");
+    light = es_default_light_desc();
+    light.name = "sun";
+    light.type = ES_LIGHT_DIRECTIONAL;
+    light.intensity = 1.5f;
+    light.color[0] = 0.7f;
+    light.node = add_node(world, "sun", (es_vec3){-2, 4, 2}, (es_quat){-0.6f, 0, 0, 0.8f}, one);
+    check(context, es_world_add_light(world, &light, &added), "adding a light");
+
+    es_camera_desc camera = es_default_camera_desc();
+    es_camera eye;
+    camera.node = add_node(world, "eye", (es_vec3){0, 1.1f, 4}, upright, one);
+    camera.near_plane = 0.05f;
+    check(context, es_world_add_camera(world, &camera, &eye), "adding a camera");
+    check(context, es_world_set_active_camera(world, eye), "choosing a camera");
+    es_world_set_step_function(world, move_parts, p);
+    check(context, es_world_step(world, 0), "the first step");
+}
+
+/* ---- frames ----------------------------------------------------------------------------------------------------------------- */
+
+typedef struct plan {
+    const char* name;
+    uint32_t triangles, width, height, vpls, interleave, ism_size, ism_points, tone_map;
+    bool glossy;
+} plan;
+
+/* Odd sizes leave partial tiles and partial vectors. */
+static const plan plans[] = {
+    {"cornell", 0, 160, 120, 64, 4, 64, 1024, ES_TONE_MAP_REINHARD, false},
+    {"room", 4000, 157, 119, 128, 8, 128, 1024, ES_TONE_MAP_PBR_NEUTRAL, false},
+    {"hall", 8000, 131, 97, 50, 3, 32, 500, ES_TONE_MAP_LINEAR, false},
+    {"parts", 0, 144, 96, 48, 2, 64, 1024, ES_TONE_MAP_REINHARD, true},
+};
+
+static void print_images(es_context* context, es_renderer* renderer, es_world* world, const char* scene, const char* frame)
+{
+    check(context, es_renderer_render(renderer, world), "rendering");
+    for (size_t i = 0; i < es_image_name_count(); i++) {
+        es_image image = {0};
+        check(context, es_renderer_image(renderer, es_image_name(i), &image), es_image_name(i));
+        printf("%s %s %s %016" PRIx64 "\n", scene, frame, es_image_name(i), es_image_hash(&image));
+        es_image_destroy(context, &image);
+    }
+}
+
+static void move_eye(es_context* context, es_world* world)
+{
+    es_camera_desc camera;
+    es_transform transform;
+    check(context, es_world_get_camera(world, es_world_active_camera(world), &camera), "reading the camera");
+    check(context, es_world_get_node_transform(world, camera.node, &transform), "reading the camera's node");
+    transform.translation.x += 0.0625f;
+    check(context, es_world_set_node_transform(world, camera.node, &transform), "moving the camera");
+    check(context, es_world_step(world, 0), "a step of no time");
+}
+
+static void print_frames(es_context* context, const plan* p, bool skip)
+{
+    es_world_settings world_settings = es_default_world_settings();
+    world_settings.triangles = p->triangles;
+    es_world* world = NULL;
+    parts* made = NULL;
+    if (strcmp(p->name, "parts") == 0) {
+        made = calloc(1, sizeof *made);
+        if (!made) stop(context, "memory");
+        make_parts(context, &world_settings, &world, made);
+    } else {
+        check(context, es_world_create_scene(context, p->name, &world_settings, &world), p->name);
+    }
+
+    es_renderer_settings settings = es_default_renderer_settings();
+    settings.width = p->width;
+    settings.height = p->height;
+    settings.skip = skip;
+    settings.shadow_size = 256;
+    settings.light_size = 128;
+    settings.vpls = p->vpls;
+    settings.glossy_vpls = p->glossy;
+    settings.interleave = p->interleave;
+    settings.ism_size = p->ism_size;
+    settings.ism_points = p->ism_points;
+    settings.ism_pool = 32768;
+    settings.classic_size = 64;
+    settings.tone_map = p->tone_map;
+    es_renderer* renderer;
+    check(context, es_renderer_create(context, &settings, &renderer), "creating a renderer");
+
+    print_images(context, renderer, world, p->name, "first");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "second");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "third");
+    check(context, es_world_step(world, 0), "a step of no time");
+    print_images(context, renderer, world, p->name, "still");
+    print_images(context, renderer, world, p->name, "unchanged");
+    move_eye(context, world);
+    print_images(context, renderer, world, p->name, "camera");
+    settings.exposure += 0.5f;
+    check(context, es_renderer_configure(renderer, &settings), "changing the exposure");
+    print_images(context, renderer, world, p->name, "exposure");
+    settings.seed += 1;
+    check(context, es_renderer_configure(renderer, &settings), "changing the seed");
+    print_images(context, renderer, world, p->name, "seed");
+    settings.method = ES_GI_CLASSIC;
+    settings.vpls = 16;
+    check(context, es_renderer_configure(renderer, &settings), "changing the method");
+    print_images(context, renderer, world, p->name, "classic");
+
+    es_renderer_destroy(renderer);
+    es_world_destroy(world);
+    free(made);
+}
+
+int main(int argc, char** argv)
+{
+    es_context_desc desc = es_default_context_desc();
+    bool skip = true;
+    const char* chosen[16];
+    int chosen_count = 0;
+    for (int i = 1; i < argc; i++) {
+        es_isa isa;
+        if (strcmp(argv[i], "--isas") == 0) {
+            for (int k = 0; k < ES_ISA_COUNT; k++)
+                if (es_isa_available_mask() >> k & 1) puts(es_isa_name((es_isa)k));
+            return 0;
+        } else if (strcmp(argv[i], "--threads") == 0 && i + 1 < argc) {
+            desc.threads = (uint32_t)strtoul(argv[++i], NULL, 10);
+        } else if (strcmp(argv[i], "--isa") == 0 && i + 1 < argc && es_isa_from_name(argv[i + 1], &isa)) {
+            desc.isa_mask = 1u << isa;
+            i++;
+        } else if (strcmp(argv[i], "--no-skip") == 0) {
+            skip = false;
+        } else if (argv[i][0] != '-' && chosen_count < 16) {
+            chosen[chosen_count++] = argv[i];
+        } else {
+            fprintf(stderr, "frame_hashes: %s: not understood; [--threads N] [--isa NAME] [--no-skip] [SCENE …] or --isas\n", argv[i]);
+            return 2;
+        }
+    }
+
+    es_context* context = NULL;
+    if (es_context_create(&desc, &context) != ES_OK) stop(NULL, "creating a context");
+    for (size_t i = 0; i < sizeof plans / sizeof *plans; i++) {
+        bool wanted = chosen_count == 0;
+        for (int k = 0; k < chosen_count; k++) wanted |= strcmp(chosen[k], plans[i].name) == 0;
+        if (wanted) print_frames(context, &plans[i], skip);
+    }
+    es_context_destroy(context);
+    return fflush(stdout) == 0 && !ferror(stdout) ? 0 : 1;
+}

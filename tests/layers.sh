@@ -1,0 +1,171 @@
+#!/usr/bin/env bash
+# The house rules that a compiler does not check: a floor includes and calls only floors below it; a third party's header is
+# included in its one file; the library keeps no mutable state of file scope, defines no global name without its prefix,
+# exports what its headers declare and nothing else, and calls none of libm's functions, whose results differ between
+# machines.
+# usage: layers.sh BUILD_DIR SOURCE_DIR
+set -u
+build=$1
+source=$2
+cd "$source" || exit 1
+status=0
+fail()
+{
+    echo "FAILED: $*"
+    status=1
+}
+
+floors="platform raster sim gi"
+rank()
+{
+    case $1 in
+    platform) echo 0 ;;
+    raster) echo 1 ;;
+    sim) echo 2 ;;
+    gi) echo 3 ;;
+    *) echo 9 ;;
+    esac
+}
+
+# ---- text -------------------------------------------------------------------------------------------------------------
+
+# shellcheck disable=SC2086
+files=$(find $floors demos tests -type f \( -name '*.c' -o -name '*.h' -o -name '*.cpp' -o -name '*.inl' -o -name '*.sh' -o -name '*.cmake' \))
+for file in $files CMakeLists.txt; do
+    grep -q $'\t' "$file" && fail "$file:$(grep -n -m 1 $'\t' "$file" | cut -d: -f1): a tab"
+    grep -q $'\r' "$file" && fail "$file:$(grep -n -m 1 $'\r' "$file" | cut -d: -f1): a carriage return"
+    grep -qE ' +$' "$file" && fail "$file:$(grep -nE -m 1 ' +$' "$file" | cut -d: -f1): blanks at the end of a line"
+    [ -n "$(tail -c 1 "$file")" ] && fail "$file: the last line has no line feed"
+done
+
+# ---- includes ---------------------------------------------------------------------------------------------------------
+
+# C11, POSIX and intrinsics may be included anywhere; these nowhere but in one file.
+plain='^(assert|ctype|errno|fenv|float|inttypes|limits|locale|math|setjmp|signal|stdalign|stdarg|stdatomic|stdbool|stddef|stdint|stdio|stdlib|stdnoreturn|string|strings|time|wchar|dirent|dlfcn|fcntl|libgen|poll|pthread|sched|semaphore|unistd|sys/[a-z]+|immintrin|emmintrin|xmmintrin|smmintrin|cpuid|arm_neon|xlocale)\.h$'
+declare -A only_in=(
+    ['^(openexr|Imf|Iex|Imath|OpenEXR/).*']=platform/image_exr.c
+    ['^(png|pngconf)\.h$|^libpng.*']=platform/image_png.c
+    ['^GLFW/.*']=platform/window.c
+    ['^(X11|xcb)/.*|^sys/(ipc|shm)\.h$']=platform/window.c
+    ['^(tiny_gltf|stb_.*|json)\.(h|hpp)$|^nlohmann/.*']=sim/import_gltf.cpp
+)
+while IFS=: read -r file line text; do
+    floor=${file%%/*}
+    name=$(sed -E 's/^[[:space:]]*#[[:space:]]*include[[:space:]]*[<"]([^>"]+)[>"].*/\1/' <<<"$text")
+    from_floor=
+    case $name in
+    earthshine/*) from_floor=$(basename "$name" .h) ;;
+    platform/* | raster/* | sim/* | gi/* | demos/* | tests/*) from_floor=${name%%/*} ;;
+    esac
+    case $floor in
+    platform | raster | sim | gi)
+        if [ -n "$from_floor" ]; then
+            [ "$(rank "$from_floor")" -le "$(rank "$floor")" ] || fail "$file:$line: $floor/ must not include $name: a floor includes only floors below"
+            continue
+        fi
+        ;;
+    demos)
+        case $name in
+        platform/* | raster/* | sim/* | gi/* | tests/*) fail "$file:$line: demos/ must not include $name: people use the public headers, <earthshine/…>" ;;
+        esac
+        ;;
+    esac
+    for pattern in "${!only_in[@]}"; do
+        if [[ $name =~ $pattern ]]; then
+            if [ "$file" != "${only_in[$pattern]}" ] && [ "$floor" != tests ]; then
+                fail "$file:$line: $name may be included in ${only_in[$pattern]} only"
+            fi
+            continue 2
+        fi
+    done
+    if [[ $text == *"<"* && -z $from_floor && $floor != tests && $floor != demos && ! $name =~ $plain && ! ($file == *.cpp && $name =~ ^[a-z_]+$) ]]; then
+        fail "$file:$line: <$name> is neither of the C library, nor POSIX, nor a third party with a file of its own"
+    fi
+done < <(grep -nE '^[[:space:]]*#[[:space:]]*include[[:space:]]*[<"]' $files)
+
+for header in $floors; do
+    grep -nE '#include "' "$header/$header.h" && fail "$header/$header.h is installed and must include others as <earthshine/…>"
+done
+cpp_files=$(find $floors demos tests -name '*.cpp' -o -name '*.cc' -o -name '*.cxx' -o -name '*.hpp' | tr '\n' ' ')
+case $cpp_files in
+"" | "sim/import_gltf.cpp ") ;;
+*) fail "C++ files besides sim/import_gltf.cpp: $cpp_files" ;;
+esac
+
+# ---- objects ----------------------------------------------------------------------------------------------------------
+
+# Of the library's build folders, without what is left there of files that are gone.
+objects=$(find "$build/CMakeFiles/earthshine.dir" "$build"/CMakeFiles/earthshine_kernels_*.dir -name '*.o' 2>/dev/null |
+    while read -r object; do
+        from=${object#"$build"/CMakeFiles/*.dir/}
+        [ -f "$source/${from%.o}" ] && echo "$object"
+    done)
+[ -n "$objects" ] || fail "no object files in $build: build the library first"
+importer=import_gltf.cpp
+
+# Names of libm's functions, by the library itself; of these only the exactly rounded square root is allowed.
+libm=$(gcc -print-file-name=libm.so.6 2>/dev/null)
+[ -f "$libm" ] || libm=$(find /lib /usr/lib -name 'libm.so.6' 2>/dev/null | head -n 1)
+libm_names=$build/libm_names.txt
+nm -D --defined-only "$libm" | awk '{ sub(/@.*/, "", $3); print $3 }' | grep -E '^[a-z]' | sort -u | grep -vxE 'sqrtf?' >"$libm_names"
+
+definitions=$build/definitions.txt
+: >"$definitions"
+for object in $objects; do
+    file=${object#"$build"/CMakeFiles/*.dir/}
+    file=${file%.o}
+    floor=${file%%/*}
+
+    # sysv format: Name|Value|Class|Type|Size|Line|Section; what may be written to lies in .data* or .bss*, but for
+    # .data.rel.ro, which is constant once the loader has filled in its addresses
+    state=$(nm -f sysv "$object" | tr -d ' ' | awk -F'|' '
+        $7 ~ /^\.(data|bss|tdata|tbss)/ && $7 !~ /^\.data\.rel\.ro/ && $4 != "SECTION" && $1 !~ /^\./ { print $1 }
+        $7 ~ /COM/ { print $1 }')
+    if [[ $file == *"$importer" ]]; then
+        # <iostream>'s initializer and the guards of the C++ library's own inline functions
+        state=$(grep -vE '^(_ZStL8__ioinit|_ZGVZ?N?(St|K?N?9__gnu_cxx|K?N?8nlohmann|K?N?8tinygltf).*|DW\.ref\.__gxx_personality_v0)$' <<<"$state")
+    fi
+    [ -n "$state" ] && fail "$file keeps state of file scope: $(tr '\n' ' ' <<<"$state")"
+
+    # inline functions and templates that C++ puts into every object are weak; a user's own copy of them is the same
+    strangers=$(nm -g --defined-only "$object" | awk '{ print $2, $3 }' | grep -v ' es_')
+    [[ $file == *"$importer" ]] && strangers=$(grep -vE '^([WVu] _Z|V DW\.ref)' <<<"$strangers")
+    [ -n "$strangers" ] && fail "$file defines global names without the prefix es_: $(cut -d' ' -f2 <<<"$strangers" | head -n 8 | tr '\n' ' ')"
+
+    calls=$(nm -u "$object" | awk '{ sub(/@.*/, "", $2); print $2 }' | sort -u | comm -12 - "$libm_names")
+    # files are not pixels: the pictures that tinygltf would decode never reach this library
+    [[ $file == *"$importer" ]] && calls=$(grep -vxE 'pow|ldexp|frexp|floor|round' <<<"$calls")
+    [ -n "$calls" ] && fail "$file calls libm: $(tr '\n' ' ' <<<"$calls")"
+
+    nm -g --defined-only "$object" | awk -v floor="$floor" '$3 ~ /^es_/ { print $3, floor }' >>"$definitions"
+done
+
+# A declaration written by hand would get around the rule for includes.
+for object in $objects; do
+    file=${object#"$build"/CMakeFiles/*.dir/}
+    floor=${file%%/*}
+    nm -u "$object" | awk -v floor="$floor" -v file="${file%.o}" '
+        BEGIN { rank["platform"] = 0; rank["raster"] = 1; rank["sim"] = 2; rank["gi"] = 3 }
+        NR == FNR { of[$1] = $2; next }
+        ($2 in of) && rank[of[$2]] > rank[floor] { print file " calls " $2 " of " of[$2] "/" }' "$definitions" -
+done >"$build/calls_upward.txt"
+[ -s "$build/calls_upward.txt" ] && fail "a floor calls a floor above: $(head -n 3 "$build/calls_upward.txt" | tr '\n' ';')"
+
+# ---- exports ----------------------------------------------------------------------------------------------------------
+
+# shellcheck disable=SC2086
+declared=$(cat platform/platform.h raster/raster.h sim/sim.h gi/gi.h | grep -E '^ES_API ' | sed -nE 's/^ES_API [^(]*[ *](es_[a-z0-9_]+)\(.*/\1/p' | sort)
+# shellcheck disable=SC2086
+if gcc -shared -nostdlib -o "$build/exports.so" -Wl,--unresolved-symbols=ignore-all $objects 2>"$build/exports.log"; then
+    exported=$(nm -D --defined-only "$build/exports.so" | awk '$2 !~ /[WVu]/ { print $3 }' | grep -vE '^_(init|fini)$' | sort)
+    missing=$(comm -23 <(echo "$declared") <(echo "$exported") | tr '\n' ' ')
+    extra=$(comm -13 <(echo "$declared") <(echo "$exported") | tr '\n' ' ')
+    [ -n "$missing" ] && fail "declared in a public header but not defined: $missing"
+    [ -n "$extra" ] && fail "exported but in no public header: $extra"
+    rm -f "$build/exports.so"
+else
+    fail "the objects do not link as a shared library: $(head -n 1 "$build/exports.log")"
+fi
+
+[ $status -eq 0 ] && echo "$(wc -w <<<"$objects") objects and $(wc -w <<<"$files") files keep the house rules"
+exit $status

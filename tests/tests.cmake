@@ -1,0 +1,82 @@
+# The tests. tests/run builds and runs all of them in several configurations; `ctest` in a build folder runs this one's.
+#
+# test_*.c and check_*.c are programs linked with the static library, with cmocka and with the private headers; *.sh are
+# called as `bash SCRIPT BUILD_DIR SOURCE_DIR` and may skip with exit 77. A new file is picked up by its name alone.
+# Labels: unit (the programs), threaded (those that make contexts of several threads), script.
+
+if(NOT EARTHSHINE_TESTS)
+  return()
+endif()
+enable_testing()
+
+# Prints the hash of every image of a few small frames; the determinism matrix and the goldens compare its output. It
+# needs no test library, so that it can be built for a machine that has none.
+add_executable(frame_hashes ${CMAKE_SOURCE_DIR}/tests/frame_hashes.c)
+target_link_libraries(frame_hashes PRIVATE earthshine)
+target_compile_options(frame_hashes PRIVATE ${warning_flags} ${exact_flags})
+
+find_package(PkgConfig)
+if(PkgConfig_FOUND)
+  pkg_check_modules(CMOCKA IMPORTED_TARGET cmocka)
+endif()
+if(NOT CMOCKA_FOUND)
+  if(CMAKE_CROSSCOMPILING)
+    message(STATUS "cmocka for ${CMAKE_SYSTEM_PROCESSOR} is absent: only frame_hashes is built")
+    return()
+  endif()
+  message(FATAL_ERROR "the tests need cmocka (Debian: libcmocka-dev); tests/run installs it, -DEARTHSHINE_TESTS=OFF does without")
+endif()
+
+# A sanitizer makes the same test several times slower.
+set(test_seconds 300)
+if(EARTHSHINE_SANITIZE)
+  set(test_seconds 900)
+endif()
+
+set(test_environment
+  "ASAN_OPTIONS=detect_leaks=1:abort_on_error=0:allocator_may_return_null=1"
+  "UBSAN_OPTIONS=print_stacktrace=1"
+  "TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1")
+
+file(GLOB test_programs CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/test_*.c ${CMAKE_SOURCE_DIR}/tests/check_*.c)
+foreach(source ${test_programs})
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} ${source})
+  target_link_libraries(${name} PRIVATE earthshine PkgConfig::CMOCKA Threads::Threads m)
+  target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/include)
+  target_compile_options(${name} PRIVATE ${warning_flags} ${exact_flags} -Wno-psabi)
+  target_compile_definitions(${name} PRIVATE ES_TEST_SOURCE_DIR="${CMAKE_SOURCE_DIR}" ES_TEST_BUILD_DIR="${CMAKE_BINARY_DIR}")
+  foreach(isa ${isas})
+    string(TOUPPER ${isa} upper)
+    target_compile_definitions(${name} PRIVATE ES_BUILT_${upper}=1)
+  endforeach()
+  foreach(library OPENEXR PNG GLFW TINYGLTF)
+    if(EARTHSHINE_WITH_${library})
+      target_compile_definitions(${name} PRIVATE ES_WITH_${library}=1)
+    endif()
+  endforeach()
+  add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_BINARY_DIR})
+  set(labels unit)
+  file(STRINGS ${source} threads_used REGEX "threads *= *([2-9]|[a-z])" LIMIT_COUNT 1)
+  if(threads_used)
+    list(APPEND labels threaded)
+  endif()
+  set_tests_properties(${name} PROPERTIES LABELS "${labels}" TIMEOUT ${test_seconds} SKIP_RETURN_CODE 77 ENVIRONMENT "${test_environment}")
+endforeach()
+
+# Every pass of a frame on three threads: what a sanitizer has to see.
+add_test(NAME frame COMMAND frame_hashes --threads 3 WORKING_DIRECTORY ${CMAKE_BINARY_DIR})
+set_tests_properties(frame PROPERTIES LABELS "unit;threaded" TIMEOUT ${test_seconds} ENVIRONMENT "${test_environment}")
+
+# The scripts look at objects, installed files and figures, which a sanitizer changes.
+if(NOT EARTHSHINE_SANITIZE)
+  file(GLOB test_scripts CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/*.sh)
+  foreach(source ${test_scripts})
+    get_filename_component(name ${source} NAME_WE)
+    if(name MATCHES "^(helpers|.*_helpers)$")
+      continue()
+    endif()
+    add_test(NAME ${name} COMMAND bash ${source} ${CMAKE_BINARY_DIR} ${CMAKE_SOURCE_DIR} WORKING_DIRECTORY ${CMAKE_BINARY_DIR})
+    set_tests_properties(${name} PROPERTIES LABELS script TIMEOUT 600 SKIP_RETURN_CODE 77)
+  endforeach()
+endif()
