@@ -1,0 +1,23 @@
+/* Direct + indirect + emission -> what a display shows. */
+#ifndef EARTHSHINE_GI_COMPOSE_H
+#define EARTHSHINE_GI_COMPOSE_H
+
+#include "gi/gi.h"
+
+typedef struct es_compose_job {
+    const es_gbuffer* gbuffer;
+    const float* direct[3];       /* NULL: none */
+    const float* irradiance[3];   /* indirect irradiance on the diffuse part, NULL: none */
+    const float* specular[3];     /* indirect radiance reflected by the lobe, NULL: none */
+    float exposure_scale;         /* 2^stops */
+    float white;                  /* Reinhard: the radiance that becomes 1 */
+    uint32_t tone_map;            /* es_tone_map */
+    uint32_t* xrgb;               /* sRGB-encoded, width words a row; NULL: not wanted */
+    float* radiance[3];           /* before exposure, rows of gbuffer->stride; NULL: not wanted */
+    float* indirect[3];           /* the indirect part of it; NULL: not wanted */
+    float* display[3];            /* after the tone map, linear [0, 1]; NULL: not wanted */
+} es_compose_job;
+
+void es_compose(es_context* context, const es_compose_job* job);
+
+#endif

@@ -1,0 +1,19 @@
+/* Direct light of one light source on the camera's G-buffer, with its shadow map (slope-scaled bias, percentage-closer filter). */
+#ifndef EARTHSHINE_GI_DIRECT_H
+#define EARTHSHINE_GI_DIRECT_H
+
+#include "gi/light_view.h"
+
+typedef struct es_direct_job {
+    const es_gbuffer* gbuffer;
+    es_pixel_rays rays;
+    const es_light_view* view;
+    uint32_t shadow_filter;        /* taps per side */
+    float shadow_bias, shadow_slope_bias;
+    bool first;                    /* overwrite instead of adding */
+    float* out[3];                 /* reflected radiance, rows of gbuffer->stride */
+} es_direct_job;
+
+void es_direct_light(es_context* context, const es_direct_job* job);
+
+#endif

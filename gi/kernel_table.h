@@ -1,0 +1,29 @@
+/* The light floor's kernels, one table per instruction set. */
+#ifndef EARTHSHINE_GI_KERNEL_TABLE_H
+#define EARTHSHINE_GI_KERNEL_TABLE_H
+
+#include "gi/compose.h"
+#include "gi/direct.h"
+#include "gi/gi.h"
+#include "gi/pixel_rays.h"
+#include "gi/vpl.h"
+
+/* X(name, arguments) */
+#define ES_GI_KERNELS(X)                                                                                         \
+    X(place_points, (const es_raster_mesh* mesh, const es_mat4* transform, const uint32_t* triangle,             \
+                     const uint32_t* barycentric, uint32_t count, float* x, float* y, float* z))                 \
+    /* rows [row_begin, row_end) */                                                                              \
+    X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))
+
+struct es_gi_kernels {
+#define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;
+    ES_GI_KERNELS(ES_GI_KERNEL_FIELD)
+#undef ES_GI_KERNEL_FIELD
+};
+typedef struct es_gi_kernels es_gi_kernels;
+
+/* NULL when the ISA was not built; whether it runs here is es_isa_available_mask()'s to say */
+const struct es_gi_kernels* es_gi_kernel_table(es_isa isa);
+
+#endif

@@ -1,0 +1,114 @@
+/* The last pass: radiance from its parts, tone map, sRGB.
+ *
+ * Indirect light arrives as irradiance so that the filter before this pass does not blur the albedo; it is multiplied in here:
+ * albedo · (1 - metallic) / pi (Lambert). Reinhard is the luminance operator with a white point (Reinhard et al. 2002, eq. 4),
+ * PBR Neutral the Khronos tone mapper (specification of 2024). Both are applied to linear Rec.709.
+ */
+#include "gi/kernel_table.h"
+#include "platform/simd.h"
+#include "platform/simd_maths.h"
+#include "raster/pack.h"
+
+typedef struct rgb_v { vf r, g, b; } rgb_v;
+
+static inline vf luminance(rgb_v c) { return vf_set1(0.2126f) * c.r + vf_set1(0.7152f) * c.g + vf_set1(0.0722f) * c.b; }
+static inline rgb_v scaled(rgb_v c, vf s) { return (rgb_v){c.r * s, c.g * s, c.b * s}; }
+
+static inline rgb_v reinhard(rgb_v c, float white)
+{
+    vf l = luminance(c);
+    vf factor = (vf_set1(1.0f) + l * vf_set1(1.0f / (white * white))) / (vf_set1(1.0f) + l);
+    return scaled(c, factor);
+}
+
+static inline rgb_v pbr_neutral(rgb_v c)
+{
+    const vf start = vf_set1(0.8f - 0.04f), rest = vf_set1(1.0f - (0.8f - 0.04f));
+    vf low = vf_min(c.r, vf_min(c.g, c.b));
+    vf offset = vf_select(vm_lt(low, vf_set1(0.08f)), low - vf_set1(6.25f) * low * low, vf_set1(0.04f));
+    c = (rgb_v){c.r - offset, c.g - offset, c.b - offset};
+    vf peak = vf_max(c.r, vf_max(c.g, c.b));
+    vm compress = vm_ge(peak, start);
+    vf safe = vf_select(compress, peak, vf_set1(1.0f));
+    vf new_peak = vf_set1(1.0f) - rest * rest / (safe + rest - start);
+    vf g = vf_set1(1.0f) / (vf_set1(0.15f) * (safe - new_peak) + vf_set1(1.0f));
+    rgb_v s = scaled(c, new_peak / safe);
+    vf grey = new_peak * (vf_set1(1.0f) - g);
+    return (rgb_v){vf_select(compress, s.r * g + grey, c.r), vf_select(compress, s.g * g + grey, c.g), vf_select(compress, s.b * g + grey, c.b)};
+}
+
+static inline vf display_range(vf a) { return vf_min(vf_max(a, vf_zero()), vf_set1(1.0f)); }
+
+/* IEC 61966-2-1, rounded to 8 bits */
+static inline vi srgb8(vf a)
+{
+    vf high = vf_set1(1.055f) * vf_pow(vf_max(a, vf_set1(0.0031308f)), vf_set1(1.0f / 2.4f)) - vf_set1(0.055f);
+    vf encoded = vf_select(vm_le(a, vf_set1(0.0031308f)), a * vf_set1(12.92f), high);
+    return vi_round(encoded * vf_set1(255.0f));
+}
+
+void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uint32_t row_end)
+{
+    const es_gbuffer* g = job->gbuffer;
+    for (uint32_t y = row_begin; y < row_end; y++) {
+        for (uint32_t x = 0; x < g->width; x += VW) {
+            size_t at = (size_t)y * g->stride + x;
+            vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at), surface = vi_load(g->surface + at);
+            rgb_v albedo = {es_unpack_unorm16_v(rg), es_unpack_unorm16_v(vi_shift_right_logical(rg, 16)), es_unpack_unorm16_v(b)};
+            rgb_v c;
+            es_unpack_rgb9e5_v(vi_load(g->emission + at), &c.r, &c.g, &c.b);
+            vm unlit = vi_eq(vi_shift_right_logical(surface, 24), vi_set1(ES_SURFACE_UNLIT)) & vm_gt(vf_load(g->depth + at), vf_zero());
+            c.r = c.r + vf_and(unlit, albedo.r);
+            c.g = c.g + vf_and(unlit, albedo.g);
+            c.b = c.b + vf_and(unlit, albedo.b);
+            if (job->direct[0]) {
+                c.r = c.r + vf_load(job->direct[0] + at);
+                c.g = c.g + vf_load(job->direct[1] + at);
+                c.b = c.b + vf_load(job->direct[2] + at);
+            }
+            rgb_v indirect = {vf_zero(), vf_zero(), vf_zero()};
+            if (job->irradiance[0]) {
+                vf metallic = vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f);
+                vf diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - metallic);
+                indirect.r = albedo.r * diffuse * vf_load(job->irradiance[0] + at);
+                indirect.g = albedo.g * diffuse * vf_load(job->irradiance[1] + at);
+                indirect.b = albedo.b * diffuse * vf_load(job->irradiance[2] + at);
+            }
+            if (job->specular[0]) {
+                indirect.r = indirect.r + vf_load(job->specular[0] + at);
+                indirect.g = indirect.g + vf_load(job->specular[1] + at);
+                indirect.b = indirect.b + vf_load(job->specular[2] + at);
+            }
+            c.r = c.r + indirect.r;
+            c.g = c.g + indirect.g;
+            c.b = c.b + indirect.b;
+            if (job->indirect[0]) {
+                vf_store(job->indirect[0] + at, indirect.r);
+                vf_store(job->indirect[1] + at, indirect.g);
+                vf_store(job->indirect[2] + at, indirect.b);
+            }
+            if (job->radiance[0]) {
+                vf_store(job->radiance[0] + at, c.r);
+                vf_store(job->radiance[1] + at, c.g);
+                vf_store(job->radiance[2] + at, c.b);
+            }
+            if (!job->xrgb && !job->display[0]) continue;
+            c = scaled(c, vf_set1(job->exposure_scale));
+            if (job->tone_map == ES_TONE_MAP_REINHARD) c = reinhard(c, job->white);
+            else if (job->tone_map == ES_TONE_MAP_PBR_NEUTRAL) c = pbr_neutral(c);
+            c = (rgb_v){display_range(c.r), display_range(c.g), display_range(c.b)};
+            if (job->display[0]) {
+                vf_store(job->display[0] + at, c.r);
+                vf_store(job->display[1] + at, c.g);
+                vf_store(job->display[2] + at, c.b);
+            }
+            if (job->xrgb) {
+                vi word = (srgb8(c.r) << 16) | (srgb8(c.g) << 8) | srgb8(c.b);
+                uint32_t* out = job->xrgb + (size_t)y * g->width + x;
+                if (x + VW <= g->width) vi_store(out, word);
+                else
+                    for (uint32_t k = 0; x + k < g->width; k++) out[k] = (uint32_t)word[k];
+            }
+        }
+    }
+}
