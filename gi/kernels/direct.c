@@ -16,7 +16,7 @@ static inline vf row_times(const float* m, int row, vf x, vf y, vf z)
 }
 
 /* Share of the filter's weight that is lit, on one face; lanes outside `lanes` are undefined. A filter of k taps per side is a box
- * of k - 1 texels slid continuously (bilinear for k = 2): weights 1 - f, 1, …, 1, f along each axis. */
+ * of k - 1 texels slid continuously (bilinear for k = 2): weights 1 - f, 1, …, 1, f along each axis; one tap is the nearest. */
 static vf lit_share(const es_direct_job* job, const es_light_face* face, vm lanes, vf px, vf py, vf pz, vf slope)
 {
     const es_light_view* view = job->view;
@@ -39,12 +39,7 @@ static vf lit_share(const es_direct_job* job, const es_light_face* face, vm lane
         cy = cy * inverse;
     }
     const int taps = (int)job->shadow_filter;
-    vf u = (cx + one) * half_size - vf_set1(0.5f * (float)taps), v = (one - cy) * half_size - vf_set1(0.5f * (float)taps);
-    if (taps == 1) {
-        /* nearest: the texel the point falls in */
-        u = u + vf_set1(0.5f);
-        v = v + vf_set1(0.5f);
-    }
+    vf u = (cx + one) * half_size - vf_set1(0.5f * (float)(taps - 1)), v = (one - cy) * half_size - vf_set1(0.5f * (float)(taps - 1));
     vf limit = vf_set1((float)size);
     u = vf_min(vf_max(u, vf_neg(limit)), limit);
     v = vf_min(vf_max(v, vf_neg(limit)), limit);

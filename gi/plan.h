@@ -1,0 +1,56 @@
+/* The frame plan: which passes run, and why the others do not.
+ *
+ * Each pass has a signature: a hash of the settings it reads and of the versions of what it reads from (the world's revisions, the
+ * outputs of earlier passes). A pass whose signature is that of its last run would write the same bits again and is skipped;
+ * one that runs gets a new output version, which changes the signatures of those that read it. */
+#ifndef EARTHSHINE_GI_PLAN_H
+#define EARTHSHINE_GI_PLAN_H
+
+#include "gi/gi.h"
+
+#define ES_PASSES(X)                                                                                             \
+    X(VISIBILITY, "visibility", "triangles")                                                                     \
+    X(SHADOW_MAPS, "shadow maps", "triangles")                                                                   \
+    X(LIGHT_VIEWS, "light views", "triangles")                                                                   \
+    X(VPLS, "vpls", "lights")                                                                                    \
+    X(POINTS, "points", "points")                                                                                \
+    X(ISM, "imperfect shadow maps", "points")                                                                    \
+    X(CLASSIC, "classic shadow maps", "maps")                                                                    \
+    X(DIRECT, "direct", "lights")                                                                                \
+    X(SHADING, "shading", "samples")                                                                             \
+    X(FILTER, "filter", "pixels")                                                                                \
+    X(COMPOSE, "compose", "pixels")
+
+typedef enum es_pass {
+#define ES_PASS_ENUM(id, name, unit) ES_PASS_##id,
+    ES_PASSES(ES_PASS_ENUM)
+#undef ES_PASS_ENUM
+    ES_PASS_COUNT
+} es_pass;
+
+typedef struct es_plan {
+    bool skip;                             /* may passes be skipped for unchanged inputs? */
+    bool valid[ES_PASS_COUNT];             /* the pass has run and its output still stands */
+    uint64_t signature[ES_PASS_COUNT];     /* of its last run */
+    uint64_t version[ES_PASS_COUNT];       /* of its output */
+    uint64_t pending;                      /* signature being put together */
+    double started;
+    es_pass_stats stats[ES_PASS_COUNT];
+} es_plan;
+
+/* Clears the statistics of the last frame. */
+void es_plan_begin_frame(es_plan* plan, bool skip);
+/* Forgets all outputs, as after a change of sizes. */
+void es_plan_invalidate(es_plan* plan);
+
+/* A pass: begin, add what it reads, then ask. es_plan_run is false when the output of the last run stands; the reason is written
+ * down. After true, do the work and call es_plan_done. */
+void es_plan_begin(es_plan* plan, es_pass pass);
+void es_plan_reads(es_plan* plan, const void* bytes, size_t size);
+void es_plan_reads_pass(es_plan* plan, es_pass other);
+bool es_plan_run(es_plan* plan, es_pass pass);
+void es_plan_done(es_plan* plan, es_pass pass, uint64_t count);
+/* The frame has no use for the pass. Its output gets a new version if it had one. `why` is a literal. */
+void es_plan_not_needed(es_plan* plan, es_pass pass, const char* why);
+
+#endif
