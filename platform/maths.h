@@ -11,8 +11,9 @@
 
 #define ES_PI 3.14159265358979323846f
 
-float es_sin(float x);   /* |x| <= 8192 radians; NaN in, NaN out; beyond: the range reduction loses accuracy but stays in [-1, 1] */
+float es_sin(float x);   /* |x| <= 8192 radians; NaN for NaN and infinities; beyond: the range reduction loses accuracy but stays in [-1, 1] */
 float es_cos(float x);
+void es_sincos(float x, float* sine, float* cosine); /* both for the price of one */
 float es_tan(float x);   /* es_sin / es_cos */
 float es_exp2(float x);  /* 0 below -126 (no denormals), infinity above 128 */
 float es_log2(float x);  /* -infinity at 0, NaN below; denormals as if 2^-126 */
