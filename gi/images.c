@@ -1,0 +1,261 @@
+/* Named images of the last frame, made on request from the planes the passes left. */
+#include <string.h>
+
+#include "gi/renderer.h"
+#include "platform/context.h"
+#include "platform/maths.h"
+#include "platform/settings.h"
+#include "raster/pack.h"
+
+typedef enum image_kind {
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
+    IMAGE_IMPORTANCE, IMAGE_ISM
+} image_kind;
+
+static const struct { image_kind kind; const char *name, *description; } images[] = {
+    {IMAGE_DISPLAY, "display", "what the window shows: tone-mapped, linear 0 to 1"},
+    {IMAGE_RADIANCE, "radiance", "direct + indirect + emission, W/(m² sr)"},
+    {IMAGE_DIRECT, "direct", "reflected direct light, W/(m² sr)"},
+    {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
+    {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
+    {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
+    {IMAGE_ALBEDO, "albedo", "base colour, linear"},
+    {IMAGE_NORMAL, "normal", "world shading normal"},
+    {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},
+    {IMAGE_DEPTH, "depth", "distance along the view axis, metres; 0 where nothing is"},
+    {IMAGE_MOTION, "motion", "pixel position now minus last frame's"},
+    {IMAGE_EMISSION, "emission", "emitted radiance, W/(m² sr)"},
+    {IMAGE_METALLIC, "metallic", "0 to 1"},
+    {IMAGE_ROUGHNESS, "roughness", "0 to 1; Phong surfaces: exponent / 50"},
+    {IMAGE_SPECULAR, "specular", "weight of the specular lobe, 0 to 1"},
+    {IMAGE_INSTANCE, "instance", "instance id + 1; 0 where nothing is"},
+    {IMAGE_MATERIAL, "material", "material index + 1; 0 where nothing is"},
+    {IMAGE_TRIANGLE, "triangle", "triangle index in its mesh + 1; 0 where nothing is"},
+    {IMAGE_SHADOW_MAP, "shadow-map", "reversed depth of the first light; a cube's faces side by side"},
+    {IMAGE_LIGHT_ALBEDO, "light-albedo", "base colour in the first light's G-buffer; a cube's faces side by side"},
+    {IMAGE_LIGHT_NORMAL, "light-normal", "normal in the first light's G-buffer"},
+    {IMAGE_IMPORTANCE, "importance", "where the first light's virtual point lights go (Knecht eq. 4.3)"},
+    {IMAGE_ISM, "ism", "the first 64 shadow maps of the virtual point lights, 0 near, 1 far or empty"},
+};
+enum { IMAGE_COUNT = sizeof images / sizeof images[0] };
+
+size_t es_image_name_count(void) { return IMAGE_COUNT; }
+const char* es_image_name(size_t index) { return index < IMAGE_COUNT ? images[index].name : NULL; }
+const char* es_image_description(size_t index) { return index < IMAGE_COUNT ? images[index].description : NULL; }
+
+/* ---- from packed planes --------------------------------------------------------------------------------------------------- */
+
+static void put_normal(const uint32_t* plane, const float* depth, uint32_t stride, es_image* image)
+{
+    for (uint32_t y = 0; y < image->height; y++)
+        for (uint32_t x = 0; x < image->width; x++) {
+            size_t at = (size_t)y * stride + x;
+            float* out = image->pixels + ((size_t)y * image->width + x) * 3;
+            es_vec3 n = depth[at] > 0.0f ? es_unpack_normal(plane[at]) : (es_vec3){0, 0, 0};
+            out[0] = n.x;
+            out[1] = n.y;
+            out[2] = n.z;
+        }
+}
+
+static void put_albedo(const es_gbuffer* g, uint32_t first_column, es_image* image)
+{
+    const float unit = 1.0f / 65535.0f;
+    for (uint32_t y = 0; y < g->height; y++)
+        for (uint32_t x = 0; x < g->width; x++) {
+            size_t at = (size_t)y * g->stride + x;
+            float* out = image->pixels + ((size_t)y * image->width + first_column + x) * 3;
+            out[0] = (float)(g->albedo_rg[at] & 0xffff) * unit;
+            out[1] = (float)(g->albedo_rg[at] >> 16) * unit;
+            out[2] = (float)(g->albedo_b[at] & 0xffff) * unit;
+        }
+}
+
+static void put_planes(const float* const planes[3], uint32_t stride, es_image* image)
+{
+    for (uint32_t y = 0; y < image->height; y++)
+        for (uint32_t x = 0; x < image->width; x++)
+            for (int k = 0; k < 3; k++) image->pixels[((size_t)y * image->width + x) * 3 + k] = planes[k][(size_t)y * stride + x];
+}
+
+static float channel_value(const es_gbuffer* g, image_kind kind, size_t at)
+{
+    uint32_t surface = g->surface[at];
+    bool seen = g->depth[at] > 0.0f;
+    switch (kind) {
+    case IMAGE_DEPTH: return g->depth[at];
+    case IMAGE_METALLIC: return (float)(surface & 0xff) * (1.0f / 255.0f);
+    case IMAGE_ROUGHNESS: return (float)(surface >> 8 & 0xff) * (surface >> 24 == ES_SURFACE_PHONG ? 1.0f / 250.0f : 1.0f / 255.0f);
+    case IMAGE_SPECULAR: return (float)(surface >> 16 & 0xff) * (1.0f / 255.0f);
+    case IMAGE_INSTANCE: return (float)g->instance[at];
+    case IMAGE_MATERIAL: return seen ? (float)((g->albedo_b[at] >> 16) + 1) : 0.0f;
+    case IMAGE_TRIANGLE: return (float)g->triangle[at];
+    default: return 0.0f;
+    }
+}
+
+static void put_channel(const es_gbuffer* g, image_kind kind, es_image* image)
+{
+    for (uint32_t y = 0; y < g->height; y++)
+        for (uint32_t x = 0; x < g->width; x++) image->pixels[(size_t)y * g->width + x] = channel_value(g, kind, (size_t)y * g->stride + x);
+}
+
+/* ---- from the composing kernel, with other outputs --------------------------------------------------------------------------- */
+
+static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* image)
+{
+    es_planes planes = {0};
+    es_result result = es_planes_resize(renderer->context, &planes, &renderer->gbuffer);
+    if (result) return result;
+    es_compose_job job = es_renderer_compose_job(renderer);
+    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : job.indirect;
+    for (int k = 0; k < 3; k++) {
+        target[k] = planes.at[k];
+        if (kind == IMAGE_INDIRECT_UNFILTERED) {
+            if (job.irradiance[k]) job.irradiance[k] = renderer->irradiance.at[k];
+            if (job.specular[k]) job.specular[k] = renderer->specular.at[k];
+        }
+    }
+    es_compose(renderer->context, &job);
+    const float* const from[3] = {planes.at[0], planes.at[1], planes.at[2]};
+    put_planes(from, renderer->gbuffer.stride, image);
+    es_planes_free(renderer->context, &planes);
+    return ES_OK;
+}
+
+/* ---- of the light ---------------------------------------------------------------------------------------------------------------- */
+
+static void put_shadow_map(const es_light_view* view, es_image* image)
+{
+    uint32_t size = image->height;
+    for (uint32_t f = 0; f < view->face_count; f++)
+        for (uint32_t y = 0; y < size; y++) memcpy(image->pixels + (size_t)y * image->width + f * size, view->faces[f].shadow_depth + (size_t)y * size, size * sizeof(float));
+}
+
+static void put_importance(const es_importance* importance, es_image* image)
+{
+    uint32_t size = importance->size;
+    for (uint32_t f = 0; f < importance->face_count; f++)
+        for (uint32_t y = 0; y < size; y++)
+            memcpy(image->pixels + (size_t)y * image->width + f * size, importance->sums + f * importance->face_floats + (size_t)y * size, size * sizeof(float));
+}
+
+static void put_light_normal(const es_light_view* view, es_image* image)
+{
+    for (uint32_t f = 0; f < view->face_count; f++) {
+        const es_gbuffer* g = &view->faces[f].gbuffer;
+        for (uint32_t y = 0; y < g->height; y++)
+            for (uint32_t x = 0; x < g->width; x++) {
+                size_t at = (size_t)y * g->stride + x;
+                float* out = image->pixels + ((size_t)y * image->width + f * g->width + x) * 3;
+                es_vec3 n = g->depth[at] > 0.0f ? es_unpack_normal(g->normal[at]) : (es_vec3){0, 0, 0};
+                out[0] = n.x;
+                out[1] = n.y;
+                out[2] = n.z;
+            }
+    }
+}
+
+enum { ISM_COLUMNS = 8 };
+
+static void put_maps(const es_ism_maps* maps, uint32_t shown, es_image* image)
+{
+    uint32_t size = maps->size;
+    for (size_t i = 0; i < (size_t)image->width * image->height; i++) image->pixels[i] = 1.0f;
+    for (uint32_t m = 0; m < shown; m++)
+        for (uint32_t y = 0; y < size; y++)
+            for (uint32_t x = 0; x < size; x++)
+                image->pixels[(size_t)(m / ISM_COLUMNS * size + y) * image->width + m % ISM_COLUMNS * size + x] = (float)maps->texels[((size_t)m * size + y) * size + x] * (1.0f / 65535.0f);
+}
+
+/* ---- by name ------------------------------------------------------------------------------------------------------------------------ */
+
+static es_result unknown_image(es_renderer* renderer, const char* name)
+{
+    es_setting table[IMAGE_COUNT];
+    memset(table, 0, sizeof table);
+    for (int i = 0; i < IMAGE_COUNT; i++) table[i].name = images[i].name;
+    const es_setting* tables[] = {table};
+    const size_t counts[] = {IMAGE_COUNT};
+    return es_fail(renderer->context, ES_IMAGE_UNKNOWN, "there is no image \"%s\"; the nearest is \"%s\"", name, es_settings_nearest(tables, counts, 1, name));
+}
+
+es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* image)
+{
+    es_context* context = renderer->context;
+    *image = (es_image){0};
+    if (!renderer->frames) return es_misuse(context, ES_WRONG_STATE, "image \"%s\": no frame has been rendered yet", name);
+    int index = -1;
+    for (int i = 0; i < IMAGE_COUNT; i++)
+        if (strcmp(images[i].name, name) == 0) index = i;
+    if (index < 0) return unknown_image(renderer, name);
+    image_kind kind = images[index].kind;
+
+    const es_gbuffer* g = &renderer->gbuffer;
+    const es_light_view* light = renderer->light_count ? &renderer->light_views[0] : NULL;
+    uint32_t width = g->width, height = g->height, channels = 3;
+    uint32_t shown_maps = es_ism_maps_count(&renderer->maps) < 64 ? es_ism_maps_count(&renderer->maps) : 64;
+    bool of_light = kind == IMAGE_LIGHT_ALBEDO || kind == IMAGE_LIGHT_NORMAL || kind == IMAGE_IMPORTANCE;
+    if (kind == IMAGE_SHADOW_MAP && light) {
+        width = light->faces[0].shadow_view.width * light->face_count;
+        height = light->faces[0].shadow_view.width;
+    } else if (of_light && light && light->faces[0].gbuffer.memory) {
+        width = light->faces[0].gbuffer.width * light->face_count;
+        height = light->faces[0].gbuffer.width;
+    } else if (kind == IMAGE_ISM && shown_maps) {
+        width = renderer->maps.size * ISM_COLUMNS;
+        height = renderer->maps.size * ((shown_maps + ISM_COLUMNS - 1) / ISM_COLUMNS);
+    } else if (of_light || kind == IMAGE_SHADOW_MAP || kind == IMAGE_ISM) {
+        width = height = 8; /* a black image: the frame has no such thing */
+        light = NULL;
+    }
+    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM;
+    if (single) channels = 1;
+    if (kind == IMAGE_MOTION) channels = 2;
+    es_result result = es_image_create(context, width, height, channels, image);
+    if (result) return result;
+    es_fp_environment environment = es_fp_enter();
+
+    switch (kind) {
+    case IMAGE_DISPLAY:
+    case IMAGE_RADIANCE:
+    case IMAGE_INDIRECT:
+    case IMAGE_INDIRECT_UNFILTERED: result = put_composed(renderer, kind, image); break;
+    case IMAGE_DIRECT:
+    case IMAGE_IRRADIANCE: {
+        es_compose_job job = es_renderer_compose_job(renderer);
+        const float* const* planes = kind == IMAGE_DIRECT ? job.direct : job.irradiance;
+        if (planes[0]) put_planes(planes, g->stride, image);
+        break;
+    }
+    case IMAGE_ALBEDO: put_albedo(g, 0, image); break;
+    case IMAGE_NORMAL: put_normal(g->normal, g->depth, g->stride, image); break;
+    case IMAGE_GEOMETRIC_NORMAL: put_normal(g->geometric_normal, g->depth, g->stride, image); break;
+    case IMAGE_MOTION:
+        for (uint32_t y = 0; y < height; y++)
+            for (uint32_t x = 0; x < width; x++) {
+                image->pixels[((size_t)y * width + x) * 2] = g->motion_x[(size_t)y * g->stride + x];
+                image->pixels[((size_t)y * width + x) * 2 + 1] = g->motion_y[(size_t)y * g->stride + x];
+            }
+        break;
+    case IMAGE_EMISSION:
+        for (uint32_t y = 0; y < height; y++)
+            for (uint32_t x = 0; x < width; x++) {
+                es_vec3 e = es_unpack_rgb9e5(g->emission[(size_t)y * g->stride + x]);
+                memcpy(image->pixels + ((size_t)y * width + x) * 3, &e, sizeof e);
+            }
+        break;
+    case IMAGE_SHADOW_MAP: if (light) put_shadow_map(light, image); break;
+    case IMAGE_LIGHT_ALBEDO:
+        for (uint32_t f = 0; light && f < light->face_count; f++) put_albedo(&light->faces[f].gbuffer, f * light->faces[f].gbuffer.width, image);
+        break;
+    case IMAGE_LIGHT_NORMAL: if (light) put_light_normal(light, image); break;
+    case IMAGE_IMPORTANCE: if (light) put_importance(&renderer->importances[0], image); break;
+    case IMAGE_ISM: if (shown_maps) put_maps(&renderer->maps, shown_maps, image); break;
+    default: put_channel(g, kind, image); break;
+    }
+    es_fp_leave(environment);
+    if (result) es_image_destroy(context, image);
+    return result;
+}

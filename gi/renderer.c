@@ -1,0 +1,370 @@
+/* One frame, pass by pass, in the order of the frame plan (gi/plan.h). */
+#include "gi/renderer.h"
+
+#include <string.h>
+
+#include "gi/classic.h"
+#include "gi/direct.h"
+#include "gi/kernel_table.h"
+#include "platform/context.h"
+#include "platform/maths.h"
+#include "platform/settings.h"
+
+/* ---- planes ------------------------------------------------------------------------------------------------------------ */
+
+es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer)
+{
+    size_t floats = (size_t)gbuffer->stride * gbuffer->height, bytes = 3 * floats * sizeof(float);
+    if (planes->bytes == bytes) return ES_OK;
+    es_planes_free(context, planes);
+    planes->memory = es_allocate_zero(context, bytes);
+    if (!planes->memory) return es_context_last_result(context);
+    planes->bytes = bytes;
+    for (int k = 0; k < 3; k++) planes->at[k] = (float*)planes->memory + (size_t)k * floats;
+    return ES_OK;
+}
+
+void es_planes_free(es_context* context, es_planes* planes)
+{
+    es_release(context, planes->memory, planes->bytes);
+    *planes = (es_planes){0};
+}
+
+/* ---- life -------------------------------------------------------------------------------------------------------------- */
+
+static bool power_of_two(uint32_t n) { return n && !(n & (n - 1)); }
+
+static es_result check_settings(es_context* context, const es_renderer_settings* s)
+{
+    es_result result = es_settings_check(context, es_renderer_setting(0), es_renderer_setting_count(), s);
+    if (result) return result;
+    if (!power_of_two(s->light_size)) return es_fail(context, ES_SETTING_VALUE, "vpl.light-size is %u; a power of two from 8 to 2048 is accepted", s->light_size);
+    if (!power_of_two(s->ism_size)) return es_fail(context, ES_SETTING_VALUE, "ism.size is %u; 32, 64, 128 and 256 are accepted", s->ism_size);
+    if (!power_of_two(s->classic_size)) return es_fail(context, ES_SETTING_VALUE, "classic.size is %u; a power of two from 32 to 1024 is accepted", s->classic_size);
+    if (s->shadow_size % 8) return es_fail(context, ES_SETTING_VALUE, "shadow.size is %u; a multiple of 8 from 16 to 8192 is accepted", s->shadow_size);
+    if (s->ism_points % 64) return es_fail(context, ES_SETTING_VALUE, "ism.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->ism_points);
+    return ES_OK;
+}
+
+es_result es_renderer_create(es_context* context, const es_renderer_settings* settings, es_renderer** out)
+{
+    *out = NULL;
+    es_renderer_settings resolved = settings ? *settings : es_default_renderer_settings();
+    es_result result = check_settings(context, &resolved);
+    if (result) return result;
+    es_renderer* renderer = es_allocate_zero(context, sizeof *renderer);
+    if (!renderer) return es_context_last_result(context);
+    renderer->context = context;
+    renderer->settings = resolved;
+    es_context_count_object(context, 1);
+    result = es_rasterizer_create(context, &renderer->rasterizer);
+    if (result) {
+        es_renderer_destroy(renderer);
+        return result;
+    }
+    *out = renderer;
+    return ES_OK;
+}
+
+static void free_frame_buffers(es_renderer* renderer)
+{
+    es_context* context = renderer->context;
+    if (renderer->display) es_release(context, renderer->display, (size_t)renderer->gbuffer.width * renderer->gbuffer.height * sizeof(uint32_t));
+    renderer->display = NULL;
+    es_gbuffer_destroy(context, &renderer->gbuffer);
+    es_planes_free(context, &renderer->direct);
+    es_planes_free(context, &renderer->irradiance);
+    es_planes_free(context, &renderer->filtered_irradiance);
+    es_planes_free(context, &renderer->specular);
+    es_planes_free(context, &renderer->filtered_specular);
+}
+
+void es_renderer_destroy(es_renderer* renderer)
+{
+    if (!renderer) return;
+    es_context* context = renderer->context;
+    free_frame_buffers(renderer);
+    for (uint32_t i = 0; i < renderer->light_capacity; i++) {
+        es_light_view_free(context, &renderer->light_views[i]);
+        es_importance_free(context, &renderer->importances[i]);
+    }
+    es_release(context, renderer->light_views, renderer->light_capacity * sizeof *renderer->light_views);
+    es_release(context, renderer->importances, renderer->light_capacity * sizeof *renderer->importances);
+    es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
+    es_scene_points_free(context, &renderer->points);
+    es_ism_maps_free(context, &renderer->maps);
+    if (renderer->rasterizer) es_rasterizer_destroy(renderer->rasterizer);
+    es_release(context, renderer, sizeof *renderer);
+    es_context_count_object(context, -1);
+}
+
+es_result es_renderer_configure(es_renderer* renderer, const es_renderer_settings* settings)
+{
+    es_result result = check_settings(renderer->context, settings);
+    if (result) return result;
+    renderer->settings = *settings;
+    return ES_OK;
+}
+
+es_renderer_settings es_renderer_get_settings(const es_renderer* renderer) { return renderer->settings; }
+
+static es_result resize_frame(es_renderer* renderer)
+{
+    const es_renderer_settings* s = &renderer->settings;
+    if (renderer->gbuffer.width == s->width && renderer->gbuffer.height == s->height && renderer->display) return ES_OK;
+    es_context* context = renderer->context;
+    free_frame_buffers(renderer);
+    es_plan_invalidate(&renderer->plan);
+    es_result result = es_gbuffer_create(context, s->width, s->height, ES_GBUFFER_ALL, &renderer->gbuffer);
+    if (result) return result;
+    renderer->display = es_allocate_zero(context, (size_t)s->width * s->height * sizeof(uint32_t));
+    return renderer->display ? es_planes_resize(context, &renderer->direct, &renderer->gbuffer) : es_context_last_result(context);
+}
+
+static es_result reserve_lights(es_renderer* renderer, uint32_t count)
+{
+    if (count <= renderer->light_capacity) return ES_OK;
+    es_context* context = renderer->context;
+    es_light_view* views = es_allocate_zero(context, count * sizeof *views);
+    es_importance* importances = es_allocate_zero(context, count * sizeof *importances);
+    if (!views || !importances) {
+        es_release(context, views, count * sizeof *views);
+        es_release(context, importances, count * sizeof *importances);
+        return es_context_last_result(context);
+    }
+    if (renderer->light_capacity) {
+        memcpy(views, renderer->light_views, renderer->light_capacity * sizeof *views);
+        memcpy(importances, renderer->importances, renderer->light_capacity * sizeof *importances);
+    }
+    es_release(context, renderer->light_views, renderer->light_capacity * sizeof *views);
+    es_release(context, renderer->importances, renderer->light_capacity * sizeof *importances);
+    renderer->light_views = views;
+    renderer->importances = importances;
+    renderer->light_capacity = count;
+    return ES_OK;
+}
+
+static es_result reserve_vpls(es_renderer* renderer, uint32_t count)
+{
+    if (count <= renderer->vpl_capacity) return ES_OK;
+    es_context* context = renderer->context;
+    es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
+    renderer->vpl_capacity = 0;
+    renderer->vpls = es_allocate_array(context, count, sizeof *renderer->vpls);
+    if (!renderer->vpls) return es_context_last_result(context);
+    renderer->vpl_capacity = count;
+    return ES_OK;
+}
+
+/* ---- what the frame is made from -------------------------------------------------------------------------------------------- */
+
+typedef struct frame_inputs {
+    const es_draw_list* list;
+    const es_light_state* lights;
+    uint32_t light_count;
+    es_world_revisions revisions;
+    es_vec3 bounds_min, bounds_max;
+    float extent;            /* diagonal of the world's bounds, metres */
+    bool has_geometry;
+    const char* no_indirect; /* why there is no indirect light; NULL: there is */
+} frame_inputs;
+
+/* Has the surface, textures aside, a lobe whose peak reaches a tenth of a white diffuse surface's? (The rule for virtual point
+ * lights too; below it, evaluating the lobe for each of a thousand lights changes less than their sampling error.) */
+static bool material_has_lobe(const es_material_desc* m)
+{
+    if (m->model == ES_SURFACE_UNLIT) return false;
+    if (m->model == ES_SURFACE_PHONG) return m->specular > 0.0f;
+    float alpha = m->roughness * m->roughness;
+    if (m->metallic_roughness_texture.image) return true;
+    float f0 = es_maxf(m->metallic, 0.04f * m->specular);
+    return f0 > 0.4f * alpha * alpha;
+}
+
+static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
+{
+    for (uint32_t i = 0; i < renderer->vpl_count; i++)
+        if (renderer->vpls[i].glossy) return true;
+    for (uint32_t i = 0; i < list->instance_count; i++)
+        if (material_has_lobe(&list->materials[list->instances[i].material])) return true;
+    return false;
+}
+
+/* ---- passes -------------------------------------------------------------------------------------------------------------------- */
+
+static es_result pass_visibility(es_renderer* r, const frame_inputs* in)
+{
+    es_plan_begin(&r->plan, ES_PASS_VISIBILITY);
+    es_plan_reads(&r->plan, &r->view, sizeof r->view);
+    es_plan_reads(&r->plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_plan_reads(&r->plan, &in->revisions.materials, sizeof in->revisions.materials);
+    /* motion depends on last frame's pose as well: while anything moves, every frame is new */
+    uint64_t moving = in->revisions.moving ? r->frames + 1 : 0;
+    es_plan_reads(&r->plan, &moving, sizeof moving);
+    if (!es_plan_run(&r->plan, ES_PASS_VISIBILITY)) return ES_OK;
+    es_result result = es_draw_gbuffer(r->rasterizer, in->list, &r->view, &r->gbuffer, &r->stats.raster);
+    if (!result) es_plan_done(&r->plan, ES_PASS_VISIBILITY, r->stats.raster.triangles);
+    return result;
+}
+
+/* The light's pose without its colour: what its views depend on. */
+static void reads_light_poses(es_plan* plan, const frame_inputs* in)
+{
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
+    for (uint32_t i = 0; i < in->light_count; i++) {
+        es_light_state pose = in->lights[i];
+        memset(pose.radiant, 0, sizeof pose.radiant);
+        es_plan_reads(plan, &pose, sizeof pose);
+    }
+}
+
+static es_result pass_light_views(es_renderer* r, const frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    r->light_count = in->light_count;
+    if (!in->light_count || !in->has_geometry) {
+        const char* why = in->light_count ? "nothing to light" : "no light is on";
+        es_plan_not_needed(plan, ES_PASS_SHADOW_MAPS, why);
+        es_plan_not_needed(plan, ES_PASS_LIGHT_VIEWS, why);
+        r->light_count = 0;
+        return ES_OK;
+    }
+    es_result result = reserve_lights(r, in->light_count);
+    if (result) return result;
+    es_light_view_sizes sizes = {r->settings.shadow_size, r->settings.light_size, in->no_indirect == NULL};
+    for (uint32_t i = 0; i < in->light_count && !result; i++) result = es_light_view_prepare(r->context, &r->light_views[i], &in->lights[i], sizes, in->bounds_min, in->bounds_max);
+    if (result) return result;
+
+    es_plan_begin(plan, ES_PASS_SHADOW_MAPS);
+    es_plan_reads(plan, &r->settings.shadow_size, sizeof r->settings.shadow_size);
+    reads_light_poses(plan, in);
+    if (es_plan_run(plan, ES_PASS_SHADOW_MAPS)) {
+        uint64_t triangles = 0;
+        for (uint32_t i = 0; i < in->light_count && !result; i++) {
+            es_raster_stats stats = {0};
+            result = es_light_view_draw_shadow(r->rasterizer, in->list, &r->light_views[i], &stats);
+            triangles += stats.triangles;
+        }
+        if (result) return result;
+        es_plan_done(plan, ES_PASS_SHADOW_MAPS, triangles);
+    }
+
+    if (in->no_indirect) {
+        es_plan_not_needed(plan, ES_PASS_LIGHT_VIEWS, in->no_indirect);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_LIGHT_VIEWS);
+    es_plan_reads(plan, &r->settings.light_size, sizeof r->settings.light_size);
+    reads_light_poses(plan, in);
+    if (es_plan_run(plan, ES_PASS_LIGHT_VIEWS)) {
+        uint64_t triangles = 0;
+        for (uint32_t i = 0; i < in->light_count && !result; i++) {
+            es_raster_stats stats = {0};
+            result = es_light_view_draw_gbuffer(r->rasterizer, in->list, &r->light_views[i], &stats);
+            triangles += stats.triangles;
+        }
+        if (!result) es_plan_done(plan, ES_PASS_LIGHT_VIEWS, triangles);
+    }
+    return result;
+}
+
+static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    if (in->no_indirect) {
+        es_plan_not_needed(plan, ES_PASS_VPLS, in->no_indirect);
+        r->vpl_count = 0;
+        return ES_OK;
+    }
+    es_vpl_request request = {.count = r->settings.vpls, .seed = r->settings.seed, .subsets = r->settings.interleave * r->settings.interleave, .glossy = r->settings.glossy_vpls};
+    es_plan_begin(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_LIGHT_VIEWS);
+    es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
+    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy};
+    es_plan_reads(plan, words, sizeof words);
+    if (!es_plan_run(plan, ES_PASS_VPLS)) return ES_OK;
+    es_result result = reserve_vpls(r, request.count);
+    for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i]);
+    if (!result) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->vpl_count);
+    if (!result) es_plan_done(plan, ES_PASS_VPLS, r->vpl_count);
+    return result;
+}
+
+static uint32_t subset_count(const es_renderer_settings* s)
+{
+    uint32_t count = s->ism_pool / s->ism_points;
+    uint32_t most = s->vpls ? s->vpls : 1;
+    return count < 1 ? 1 : count > most ? most : count;
+}
+
+static es_result pass_maps(es_renderer* r, const frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* none = in->no_indirect ? in->no_indirect : r->vpl_count ? NULL : "the lights reach nothing";
+    if (none || s->method != ES_GI_ISM) {
+        const char* why = none ? none : "gi is not ism";
+        es_plan_not_needed(plan, ES_PASS_POINTS, why);
+        es_plan_not_needed(plan, ES_PASS_ISM, why);
+    }
+    if (none || s->method != ES_GI_CLASSIC) es_plan_not_needed(plan, ES_PASS_CLASSIC, none ? none : "gi is not classic");
+    if (none) return ES_OK;
+
+    if (s->method == ES_GI_CLASSIC) {
+        es_plan_begin(plan, ES_PASS_CLASSIC);
+        es_plan_reads_pass(plan, ES_PASS_VPLS);
+        es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+        es_plan_reads(plan, &s->classic_size, sizeof s->classic_size);
+        if (!es_plan_run(plan, ES_PASS_CLASSIC)) return ES_OK;
+        es_result result = es_classic_maps_build(r->context, r->rasterizer, in->list, r->vpls, r->vpl_count, s->classic_size, in->extent, &r->maps);
+        if (!result) es_plan_done(plan, ES_PASS_CLASSIC, r->vpl_count);
+        return result;
+    }
+
+    uint32_t subsets = subset_count(s);
+    es_plan_begin(plan, ES_PASS_POINTS);
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    uint32_t words[] = {s->ism_points, subsets};
+    es_plan_reads(plan, words, sizeof words);
+    if (es_plan_run(plan, ES_PASS_POINTS)) {
+        uint64_t moved;
+        es_result result = es_scene_points_update(r->context, &r->points, in->list, s->ism_points, subsets, &moved);
+        if (result) return result;
+        es_plan_done(plan, ES_PASS_POINTS, moved);
+    }
+
+    es_plan_begin(plan, ES_PASS_ISM);
+    es_plan_reads_pass(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_POINTS);
+    float numbers[] = {(float)s->ism_size, s->pull_push, s->pull_threshold, s->push_threshold, (float)s->pull_push_levels, in->extent};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_ISM)) return ES_OK;
+    es_ism_job job = {0};
+    es_result result = es_ism_maps_build(r->context, &r->maps, &job);
+    if (!result) es_plan_done(plan, ES_PASS_ISM, (uint64_t)r->vpl_count * s->ism_points);
+    return result;
+}
+
+static es_result pass_direct(es_renderer* r, const frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    if (!r->light_count) {
+        es_plan_not_needed(plan, ES_PASS_DIRECT, in->light_count ? "nothing to light" : "no light is on");
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_DIRECT);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
+    es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
+    float numbers[] = {(float)r->settings.shadow_filter, r->settings.shadow_bias, r->settings.shadow_slope_bias};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_DIRECT)) return ES_OK;
+    for (uint32_t i = 0; i < r->light_count; i++) {
+        es_direct_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .view = &r->light_views[i], .shadow_filter = r->settings.shadow_filter, .shadow_bias = r->settings.shadow_bias,
+            .shadow_slope_bias = r->settings.shadow_slope_bias, .first = i == 0, .out = {r->direct.at[0], r->direct.at[1], r->direct.at[2]}};
+        es_direct_light(r->context, &job);
+    }
+    es_plan_done(plan, ES_PASS_DIRECT, r->light_count);
+    return ES_OK;
+}
