@@ -213,7 +213,7 @@ ES_API void es_window_destroy(es_window* window);
 ES_API void es_window_poll(es_window* window, es_window_input* input);
 /* xrgb: width × height words 0x00RRGGBB, top row first; scaled (nearest) to the window when sizes differ. */
 ES_API void es_window_present(es_window* window, const uint32_t* xrgb, uint32_t width, uint32_t height);
-ES_API const char* es_window_backend(const es_window* window);  /* "x11-shm" or "opengl" */
+ES_API const char* es_window_backend(const es_window* window);  /* "x11-shm", "x11" (no shared memory with the server) or "opengl" */
 
 #ifdef __cplusplus
 }
