@@ -53,8 +53,10 @@ void* es_arena_allocate(es_arena* arena, size_t size)
             if (!block) return NULL;
             block->size = block_size;
             block->next = next;
-            if (current) current->next = block;
-            else arena->first = block;
+            if (current)
+                current->next = block;
+            else
+                arena->first = block;
             next = block;
         }
         arena->current = current = next;

@@ -111,8 +111,8 @@ void* es_allocate(es_context* context, size_t size)
                 context->desc.memory_cap);
             return NULL;
         }
-    } while (!atomic_compare_exchange_weak_explicit(&context->bytes, &before, before + size, memory_order_relaxed,
-        memory_order_relaxed));
+    } while (!atomic_compare_exchange_weak_explicit(
+        &context->bytes, &before, before + size, memory_order_relaxed, memory_order_relaxed));
 
     void* pointer = context->desc.allocator.allocate(context->desc.allocator.user, size, 64);
     if (!pointer) {
@@ -122,8 +122,9 @@ void* es_allocate(es_context* context, size_t size)
     }
     size_t now = before + size;
     size_t peak = atomic_load_explicit(&context->peak_bytes, memory_order_relaxed);
-    while (now > peak && !atomic_compare_exchange_weak_explicit(&context->peak_bytes, &peak, now, memory_order_relaxed,
-                             memory_order_relaxed)) {}
+    while (now > peak &&
+           !atomic_compare_exchange_weak_explicit(&context->peak_bytes, &peak, now, memory_order_relaxed, memory_order_relaxed)) {
+    }
     return pointer;
 }
 
@@ -212,7 +213,8 @@ es_result es_context_create(const es_context_desc* given, es_context** out)
     es_context draft = {.desc = resolve(given), .message_mutex = PTHREAD_MUTEX_INITIALIZER};
     es_context_desc* desc = &draft.desc;
     if (!desc->allocator.allocate || !desc->allocator.release) {
-        return es_fail(&draft, ES_INVALID_ARGUMENT, "es_context_desc.allocator has one of its two functions; give both or neither");
+        return es_fail(
+            &draft, ES_INVALID_ARGUMENT, "es_context_desc.allocator has one of its two functions; give both or neither");
     }
     if (desc->threads > ES_MAX_THREADS) {
         return es_fail(&draft, ES_INVALID_ARGUMENT, "es_context_desc.threads is %u; 1 to %d, or 0 for all, are accepted",
@@ -220,8 +222,9 @@ es_result es_context_create(const es_context_desc* given, es_context** out)
     }
     uint32_t usable = desc->isa_mask & es_isa_available_mask();
     if (usable == 0) {
-        return es_fail(&draft, ES_ISA_UNAVAILABLE, "es_context_desc.isa_mask is 0x%x; the instruction sets available here are 0x%x",
-            desc->isa_mask, es_isa_available_mask());
+        return es_fail(&draft, ES_ISA_UNAVAILABLE,
+            "es_context_desc.isa_mask is 0x%x; the instruction sets available here are 0x%x", desc->isa_mask,
+            es_isa_available_mask());
     }
     desc->isa_mask = usable;
 

@@ -10,13 +10,13 @@
 enum { ES_MAX_THREADS = 64, ES_MESSAGE_SIZE = 1024 };
 
 typedef struct es_pool {
-    pthread_mutex_t mutex;  /* over everything below but the two atomics, which are written under it and spun upon outside */
-    pthread_cond_t wake;    /* a job was posted, or the pool stops */
-    pthread_cond_t done;    /* the last task of the job ended */
+    pthread_mutex_t mutex; /* over everything below but the two atomics, which are written under it and spun upon outside */
+    pthread_cond_t wake;   /* a job was posted, or the pool stops */
+    pthread_cond_t done;   /* the last task of the job ended */
     void (*task)(void* data, uint32_t index);
     void* data;
-    uint32_t count, next;   /* tasks of the job, and the first not yet claimed */
-    uint32_t sleeping;      /* threads waiting for `wake` */
+    uint32_t count, next; /* tasks of the job, and the first not yet claimed */
+    uint32_t sleeping;    /* threads waiting for `wake` */
     bool caller_waits, stop;
     atomic_uint generation; /* jobs posted so far */
     atomic_uint unfinished; /* tasks of the job that have not ended */
@@ -25,9 +25,9 @@ typedef struct es_pool {
 } es_pool;
 
 struct es_context {
-    es_context_desc desc;  /* resolved */
+    es_context_desc desc; /* resolved */
     es_isa isa;
-    es_pool pool;          /* thread_count 0 with threads = 1 or the user's tasks */
+    es_pool pool; /* thread_count 0 with threads = 1 or the user's tasks */
     atomic_bool in_loop;
     atomic_size_t bytes, peak_bytes;
     atomic_int objects;

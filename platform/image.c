@@ -15,8 +15,8 @@ es_result es_image_create(es_context* context, uint32_t width, uint32_t height, 
     if (!context || !image) return es_misuse(context, ES_INVALID_ARGUMENT, "es_image_create needs a context and an image");
     memset(image, 0, sizeof *image);
     if (width < 1 || width > ES_IMAGE_MAX_SIZE || height < 1 || height > ES_IMAGE_MAX_SIZE) {
-        return es_fail(context, ES_IMAGE_SIZE, "an image of %u x %u pixels was asked for; each side may be 1 to %d", width, height,
-            ES_IMAGE_MAX_SIZE);
+        return es_fail(context, ES_IMAGE_SIZE, "an image of %u x %u pixels was asked for; each side may be 1 to %d", width,
+            height, ES_IMAGE_MAX_SIZE);
     }
     if (channels < 1 || channels > ES_IMAGE_MAX_CHANNELS) {
         return es_fail(context, ES_IMAGE_SIZE, "an image of %u channels was asked for; 1 to %d are accepted", channels,
@@ -31,8 +31,10 @@ es_result es_image_create(es_context* context, uint32_t width, uint32_t height, 
     }
     static const char usual[4][5] = {"Y", "YA", "RGB", "RGBA"};
     for (uint32_t c = 0; c < channels; c++) {
-        if (channels <= 4) made.channel_names[c][0] = usual[channels - 1][c];
-        else snprintf(made.channel_names[c], ES_CHANNEL_NAME_SIZE, "C%u", c);
+        if (channels <= 4)
+            made.channel_names[c][0] = usual[channels - 1][c];
+        else
+            snprintf(made.channel_names[c], ES_CHANNEL_NAME_SIZE, "C%u", c);
     }
     *image = made;
     return ES_OK;
