@@ -1,7 +1,7 @@
 /* Elementary functions and small vector algebra with the same bits everywhere.
  *
  * libm may not reach a pixel or a pose (its last bits differ between systems); only the correctly rounded sqrt does.
- * Errors are over the stated ranges, in units in the last place; tests/check_platform.c measures them. The vector forms in
+ * Errors are over the stated ranges, in units in the last place; tests/check_platform.c samples them (--samples N). The vector forms in
  * simd_maths.h perform the same operations, so a lane equals the scalar result bit for bit.
  */
 #ifndef EARTHSHINE_PLATFORM_MATHS_H
@@ -11,11 +11,11 @@
 
 #define ES_PI 3.14159265358979323846f
 
-float es_sin(float x);   /* |x| <= 8192 radians, 0.9 ulp; NaN for NaN and infinities; beyond: the range reduction loses accuracy but stays in [-1, 1] */
-float es_cos(float x);   /* the same, 0.92 ulp */
+float es_sin(float x);   /* |x| <= 8192 radians, 0.95 ulp; NaN for NaN and infinities; beyond: the range reduction loses accuracy but stays in [-1, 1] */
+float es_cos(float x);   /* the same */
 void es_sincos(float x, float* sine, float* cosine); /* both for the price of one */
-float es_tan(float x);   /* es_sin / es_cos, 2.4 ulp */
-float es_exp2(float x);  /* 1.1 ulp, exact for whole x; 0 below -126 (no denormals), infinity from 128 */
+float es_tan(float x);   /* es_sin / es_cos, 2.5 ulp */
+float es_exp2(float x);  /* 1.2 ulp, exact for whole x; 0 below -126 (no denormals), infinity from 128 */
 float es_log2(float x);  /* 1.6 ulp, exact for powers of 2; -infinity at 0, NaN below; denormals as if 2^-126 */
 float es_pow(float x, float y); /* x >= 0: exp2(y log2 x), 1.5 + 2 |y log2 x| ulp; x^0 = 1^y = 1; NaN for other x < 0 */
 float es_exp(float x);   /* 0.51 ulp; 0 where the result would be a denormal */

@@ -584,10 +584,10 @@ typedef struct accuracy {
 } accuracy;
 
 static const accuracy accuracies[] = {
-    {"sin", es_sin, sin, -8192.0f, 8192.0f, 0.9},
-    {"cos", es_cos, cos, -8192.0f, 8192.0f, 0.92},
-    {"tan", es_tan, tan, -8192.0f, 8192.0f, 2.4},
-    {"exp2", es_exp2, exp2, -126.0f, 127.99999f, 1.1},
+    {"sin", es_sin, sin, -8192.0f, 8192.0f, 0.95},
+    {"cos", es_cos, cos, -8192.0f, 8192.0f, 0.95},
+    {"tan", es_tan, tan, -8192.0f, 8192.0f, 2.5},
+    {"exp2", es_exp2, exp2, -126.0f, 127.99999f, 1.2},
     {"log2", es_log2, log2, 0x1p-126f, 0x1.fffffep127f, 1.6},
     {"log2 near 1", es_log2, log2, 0.5f, 2.0f, 1.6},
     {"exp", es_exp, exp, -87.0f, 88.7f, 0.51},
