@@ -1,8 +1,8 @@
 /* Elementary functions and small vector algebra with the same bits everywhere.
  *
  * libm may not reach a pixel or a pose (its last bits differ between systems); only the correctly rounded sqrt does.
- * Errors are over the stated ranges, in units in the last place; tests/check_platform.c samples them (--samples N). The vector forms in
- * simd_maths.h perform the same operations, so a lane equals the scalar result bit for bit.
+ * Errors are over the stated ranges, in units in the last place; tests/check_platform.c samples them (--samples N). The vector
+ * forms in simd_maths.h perform the same operations, so a lane equals the scalar result bit for bit.
  */
 #ifndef EARTHSHINE_PLATFORM_MATHS_H
 #define EARTHSHINE_PLATFORM_MATHS_H
