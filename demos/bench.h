@@ -1,0 +1,76 @@
+/* `earthshine bench`: rows with a stable id, measured against a peer in the same sitting, judged by what was asked for. */
+#ifndef EARTHSHINE_DEMO_BENCH_H
+#define EARTHSHINE_DEMO_BENCH_H
+
+#include "demo.h"
+
+typedef enum bench_judge {
+    BENCH_NONE,             /* a figure without a target */
+    BENCH_RATIO_AT_LEAST,   /* `ratio` against the targets */
+    BENCH_VALUE_AT_MOST     /* `value` against the targets */
+} bench_judge;
+
+typedef struct bench_row {
+    const char* id;
+    const char* work;       /* what was done, for people */
+    const char* unit;       /* of value and peer_value */
+    const char* peer;       /* NULL: measured against nothing */
+    bench_judge judge;
+    double must, aim;
+    double value, peer_value, ratio; /* NaN: not measured; ratio: how many times better than the peer */
+    char note[200];         /* why a figure is missing, or what stands behind it */
+} bench_row;
+
+typedef struct bench_options {
+    const char* out;                /* directory; NULL: none */
+    uint32_t runs;
+    uint32_t threads;
+    bool no_peer;
+    const char* only[32];           /* row ids; none: all */
+    size_t only_count;
+    const char* program;            /* path of this program, for the rows that start it */
+} bench_options;
+
+bool bench_wants(const bench_options* options, const char* id);
+double bench_median(double* values, size_t count); /* sorts; NaN without values */
+
+/* bench_table.c: the rows of `bench speed` and their targets, figures still NaN */
+size_t bench_speed_rows(bench_row* rows, size_t capacity);
+bench_row* bench_find_row(bench_row* rows, size_t count, const char* id);
+
+/* bench_report.c */
+void bench_print(const bench_row* rows, size_t count);
+int bench_write(const char* name, const bench_options* options, const bench_row* rows, size_t count, const es_context* context);
+const char* bench_verdict(const bench_row* row); /* "aim", "must", "missed", "" */
+
+/* bench_plot.c: how far each row is from its target, as one SVG */
+void bench_add_svg(demo_text* text, const bench_row* rows, size_t count);
+
+/* bench_child.c */
+typedef struct bench_child { int status; double seconds; double peak_mebibytes; char* output; size_t size; } bench_child;
+/* Runs a program with its standard output captured and one environment variable set (NULL: none). status 0 is success, -1: it could not be
+ * started. The caller frees output. */
+bench_child bench_run_child(const char* const* arguments, const char* variable, const char* value, bool quiet);
+
+/* bench_peer.c: llvmpipe's program from the folder of peers, built into a temporary folder */
+typedef struct bench_peer {
+    char folder[DEMO_PATH_SIZE];       /* of the peers' sources; "" when there are none */
+    char build[DEMO_PATH_SIZE];        /* temporary; "" when nothing is built */
+    char why[200];                     /* why there is no peer */
+    struct { char name[96]; double values[64]; size_t count; } rows[64];
+    size_t row_count;
+} bench_peer;
+/* False with `why` when the peers are absent or cannot be built. */
+bool bench_peer_open(bench_peer* peer, bool build);
+void bench_peer_run(bench_peer* peer);
+void bench_peer_close(bench_peer* peer);
+double bench_peer_value(bench_peer* peer, const char* name); /* median over the runs; NaN */
+
+/* bench_speed.c, bench_errors.c */
+int bench_speed(const bench_options* options);
+int bench_frame(const bench_options* options);
+/* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */
+es_renderer_settings bench_settings(void);
+void bench_measure_errors(const bench_options* options, const bench_peer* peer, bench_row* rows, size_t count);
+
+#endif

@@ -1,0 +1,116 @@
+/* What the files of the earthshine program share: options, messages, output names, listings. */
+#ifndef EARTHSHINE_DEMO_H
+#define EARTHSHINE_DEMO_H
+
+#include <earthshine/gi.h>
+#include <stdio.h>
+
+/* Exit codes of every command. */
+enum { DEMO_OK = 0, DEMO_EXCEEDED = 1, DEMO_BAD_INPUT = 2 };
+
+/* ---- messages (messages.c): one line on stderr, results alone go to stdout ---------------------------------------------------- */
+
+/* Prints "earthshine: …" and returns DEMO_BAD_INPUT. */
+int demo_refuse(const char* format, ...) ES_PRINTF(1, 2);
+/* The same with the context's last message. */
+int demo_refuse_context(const es_context* context);
+/* Warnings to stderr; errors are left to demo_refuse_context, which knows that the command ends. */
+es_logger demo_logger(void);
+/* The candidate with the least edit distance to `name`, NULL when none is near. */
+const char* demo_nearest(const char* name, const char* const* candidates, size_t count);
+
+/* ---- options (options.c) ----------------------------------------------------------------------------------------------------------- */
+
+enum { DEMO_MAX_SETS = 64, DEMO_MAX_IMAGES = 32, DEMO_MAX_FRAMES = 1000000 };
+
+typedef struct demo_options {
+    const char* scene;                      /* built-in name or file; NULL when not given */
+    const char* out;                        /* pattern; NULL */
+    const char* images[DEMO_MAX_IMAGES];
+    size_t image_count;
+    uint32_t width, height;
+    bool size_given, frames_given;
+    uint32_t first, end;                    /* frames [first, end) */
+    double fps;
+    uint32_t threads;                       /* 0: all */
+    uint32_t isa_mask;                      /* 0: best */
+    bool no_skip, hash;
+    int method;                             /* es_gi_method; -1: the setting's default */
+    const char* sets[DEMO_MAX_SETS];        /* key=value */
+    size_t set_count;
+    const char* stats;
+} demo_options;
+
+/* Parses what follows the command's name. DEMO_OK, or DEMO_BAD_INPUT after one line on stderr. */
+int demo_parse_options(const char* command, int count, char** arguments, demo_options* options);
+/* Whole-string numbers within a range; false otherwise. */
+bool demo_parse_uint(const char* text, uint32_t minimum, uint32_t maximum, uint32_t* value);
+bool demo_parse_double(const char* text, double minimum, double maximum, double* value);
+const char* demo_method_name(uint32_t method);
+
+/* ---- settings (settings.c) ------------------------------------------------------------------------------------------------------------ */
+
+/* Applies --size, --gi, --no-skip and every --set to the two structs. */
+int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer);
+int demo_settings(int count, char** arguments);
+int demo_scenes(int count, char** arguments);
+int demo_images(int count, char** arguments);
+/* Index of an image's name; -1 after a line that suggests the nearest. */
+int demo_find_image(const char* name);
+
+/* ---- a world and its renderer, opened as the options say (session.c) ---------------------------------------------------------------------- */
+
+typedef struct demo_session {
+    es_context* context;
+    es_world* world;
+    es_renderer* renderer;
+    es_renderer_settings settings;
+} demo_session;
+
+int demo_session_open(const demo_options* options, demo_session* session);
+void demo_session_close(demo_session* session);
+/* Brings the world to frame `frame`, which lies at frame / fps seconds: the first call begins at 0. */
+int demo_session_step(demo_session* session, uint32_t frame, double fps);
+
+/* ---- output (output.c) ----------------------------------------------------------------------------------------------------------------------- */
+
+enum { DEMO_PATH_SIZE = 4096 };
+
+/* A file name with at most one frame number, %d or %0Nd; %% stands for a percent sign. */
+int demo_check_pattern(const char* pattern, uint32_t frames);
+/* The name of one frame's file; the pattern was checked. */
+void demo_expand_pattern(const char* pattern, uint32_t frame, char path[DEMO_PATH_SIZE]);
+/* Tries to make a file where `path` will be, and removes it: refusals come before the work. */
+int demo_check_writable(const char* path);
+bool demo_has_image_ending(const char* path);
+/* How an image of the renderer is written: all are linear, and EXR files keep all their bits. */
+es_image_save_desc demo_save_desc(void);
+/* Writes text to a temporary name and renames it: never a half-written file. */
+int demo_write_text(const char* path, const char* text, size_t size);
+
+/* ---- text that grows (text.c) -------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct demo_text { char* bytes; size_t size, capacity; bool failed; } demo_text;
+void demo_text_add(demo_text* text, const char* format, ...) ES_PRINTF(2, 3);
+/* With the quotation marks and JSON's escapes. */
+void demo_text_add_json_string(demo_text* text, const char* string);
+void demo_text_free(demo_text* text);
+
+/* ---- machine (machine.c) --------------------------------------------------------------------------------------------------------------------------- */
+
+/* {"processor":…,"isa":…,"threads":…,"compiler":…,"commit":…,"flags":…,"version":…} */
+void demo_text_add_machine(demo_text* text, const es_context* context);
+void demo_processor_name(char* name, size_t size);
+double demo_seconds(void);
+
+/* ---- commands ----------------------------------------------------------------------------------------------------------------------------------------- */
+
+int demo_render(int count, char** arguments);
+int demo_play(int count, char** arguments);
+int demo_compare(int count, char** arguments);
+int demo_bench(int count, char** arguments);
+
+/* Renders the options' frames without a window: files, hashes, statistics. */
+int demo_render_frames(const demo_options* options, bool show_progress);
+
+#endif

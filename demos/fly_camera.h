@@ -1,0 +1,21 @@
+/* A camera that flies: it follows the scene's own camera until it is moved. */
+#ifndef EARTHSHINE_DEMO_FLY_CAMERA_H
+#define EARTHSHINE_DEMO_FLY_CAMERA_H
+
+#include "demo.h"
+
+typedef struct fly_camera {
+    es_camera own, scenes;     /* ours, and the one the scene came with */
+    es_node node;
+    es_vec3 position;
+    float yaw, pitch;          /* radians; yaw 0 looks along -z, positive to the left */
+    float speed;               /* metres per second */
+    bool flying;
+} fly_camera;
+
+int fly_camera_init(fly_camera* fly, es_world* world);
+/* Moves with what is held down; the first move leaves the scene's camera where it is and takes over from its pose. */
+int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* input, float seconds);
+int fly_camera_reset(fly_camera* fly, es_world* world);
+
+#endif

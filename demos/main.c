@@ -1,0 +1,66 @@
+/* The earthshine program: finds the command, prints help. */
+#include "demo.h"
+#include "demo_build.h"
+
+#include <string.h>
+
+static const char usage[] =
+    "usage:\n"
+    "  earthshine scenes                                list the built-in scenes\n"
+    "  earthshine play   [SCENE|FILE.gltf|FILE.glb]     a window; H lists the keys\n"
+    "  earthshine render SCENE|FILE --out PATTERN       headless: .exr .png .hdr; %04d takes the frame number\n"
+    "             --size WxH --frames A:B (B not included; default 0:1) --fps N (30) --threads N (all)\n"
+    "             --isa scalar|sse4|avx2|avx512|neon    instruction set to use; the result is the same\n"
+    "             --no-skip                             do all work again in every frame; the result is the same\n"
+    "             --gi none|ism|classic                 direct light only, imperfect shadow maps, accurate ones (slow)\n"
+    "             --set key=value …                     any setting\n"
+    "             --image NAME                          which image (default: display)\n"
+    "             --hash                                prints `frame N NAME HASH` per frame\n"
+    "             --stats FILE.json                     milliseconds and counts per frame and pass\n"
+    "  earthshine settings                              list the settings: name, default, range, meaning\n"
+    "  earthshine images                                list the images a frame can give\n"
+    "  earthshine compare A B [--diff OUT.png] [--max-rmse X] [--max-relrmse X] [--max-relmse X] [--max-max X]\n"
+    "                                                   error of A against the reference B; exit 1 when a limit is exceeded\n"
+    "  earthshine bench  [NAME …] [--out DIR]           tables and plots: speed, frame\n"
+    "  earthshine help | --version\n"
+    "play takes render's options too; with --frames or --out it needs no window.\n";
+
+typedef struct command { const char* name; int (*run)(int count, char** arguments); } command;
+
+static const command commands[] = {
+    {"scenes", demo_scenes}, {"play", demo_play}, {"render", demo_render}, {"settings", demo_settings},
+    {"images", demo_images}, {"compare", demo_compare}, {"bench", demo_bench},
+};
+enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
+
+static bool asks_for_help(const char* argument) { return !strcmp(argument, "--help") || !strcmp(argument, "-h"); }
+
+int main(int count, char** arguments)
+{
+    if (count < 2) {
+        fputs(usage, stderr);
+        return DEMO_BAD_INPUT;
+    }
+    const char* name = arguments[1];
+    if (!strcmp(name, "help") || asks_for_help(name)) {
+        fputs(usage, stdout);
+        return DEMO_OK;
+    }
+    if (!strcmp(name, "--version")) {
+        printf("earthshine %d.%d.%d (%s)\n", ES_VERSION_MAJOR, ES_VERSION_MINOR, ES_VERSION_PATCH, DEMO_COMMIT);
+        return DEMO_OK;
+    }
+    for (int i = 0; i < COMMAND_COUNT; i++) {
+        if (strcmp(commands[i].name, name) != 0) continue;
+        for (int k = 2; k < count && strcmp(arguments[k], "--") != 0; k++)
+            if (asks_for_help(arguments[k])) {
+                fputs(usage, stdout);
+                return DEMO_OK;
+            }
+        return commands[i].run(count - 2, arguments + 2);
+    }
+    const char* names[COMMAND_COUNT];
+    for (int i = 0; i < COMMAND_COUNT; i++) names[i] = commands[i].name;
+    const char* nearest = demo_nearest(name, names, COMMAND_COUNT);
+    return demo_refuse("unknown command %s; %s%s", name, nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "");
+}

@@ -1,0 +1,37 @@
+/* A world and a renderer in one context, opened as the options say, and stepped frame by frame. */
+#include "demo.h"
+
+#include <string.h>
+
+int demo_session_open(const demo_options* options, demo_session* session)
+{
+    *session = (demo_session){0};
+    es_context_desc desc = es_default_context_desc();
+    desc.logger = demo_logger();
+    desc.threads = options->threads;
+    desc.isa_mask = options->isa_mask;
+    es_result result = es_context_create(&desc, &session->context);
+    if (result != ES_OK) return demo_refuse("%s", es_result_text(result));
+    es_world_settings world_settings;
+    int code = demo_apply_settings(session->context, options, &world_settings, &session->settings);
+    if (code == DEMO_OK && es_world_open(session->context, options->scene, &world_settings, &session->world) != ES_OK)
+        code = demo_refuse_context(session->context);
+    if (code == DEMO_OK && es_renderer_create(session->context, &session->settings, &session->renderer) != ES_OK)
+        code = demo_refuse_context(session->context);
+    if (code != DEMO_OK) demo_session_close(session);
+    return code;
+}
+
+void demo_session_close(demo_session* session)
+{
+    if (session->renderer) es_renderer_destroy(session->renderer);
+    if (session->world) es_world_destroy(session->world);
+    if (session->context) es_context_destroy(session->context);
+    *session = (demo_session){0};
+}
+
+int demo_session_step(demo_session* session, uint32_t frame, double fps)
+{
+    float dt = frame ? (float)(1.0 / fps) : 0.0f; /* frame 0 is the world as it was made */
+    return es_world_step(session->world, dt) == ES_OK ? DEMO_OK : demo_refuse_context(session->context);
+}

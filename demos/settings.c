@@ -1,0 +1,115 @@
+/* What can be named on the command line, listed: settings of world and renderer, scenes, images; and settings applied. */
+#include "demo.h"
+
+#include <string.h>
+
+static bool world_has(const char* name)
+{
+    for (size_t i = 0; i < es_world_setting_count(); i++)
+        if (!strcmp(es_world_setting(i)->name, name)) return true;
+    return false;
+}
+
+static bool renderer_has(const char* name)
+{
+    for (size_t i = 0; i < es_renderer_setting_count(); i++)
+        if (!strcmp(es_renderer_setting(i)->name, name)) return true;
+    return false;
+}
+
+static int refuse_unknown(const char* name)
+{
+    enum { MOST = 256 };
+    const char* names[MOST];
+    size_t count = 0;
+    for (size_t i = 0; i < es_world_setting_count() && count < MOST; i++) names[count++] = es_world_setting(i)->name;
+    for (size_t i = 0; i < es_renderer_setting_count() && count < MOST; i++) names[count++] = es_renderer_setting(i)->name;
+    const char* nearest = demo_nearest(name, names, count);
+    if (nearest) return demo_refuse("--set %s: no such setting; did you mean %s?", name, nearest);
+    return demo_refuse("--set %s: no such setting; `earthshine settings` lists all", name);
+}
+
+int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer)
+{
+    *world = es_default_world_settings();
+    *renderer = es_default_renderer_settings();
+    if (options->size_given) {
+        renderer->width = options->width;
+        renderer->height = options->height;
+    }
+    if (options->method >= 0) renderer->method = (uint32_t)options->method;
+    if (options->no_skip) renderer->skip = false;
+    for (size_t i = 0; i < options->set_count; i++) {
+        char name[128];
+        const char* equals = strchr(options->sets[i], '=');
+        snprintf(name, sizeof name, "%.*s", (int)(equals - options->sets[i]), options->sets[i]);
+        es_result result;
+        if (renderer_has(name))
+            result = es_renderer_settings_set(context, renderer, name, equals + 1);
+        else if (world_has(name))
+            result = es_world_settings_set(context, world, name, equals + 1);
+        else
+            return refuse_unknown(name);
+        if (result != ES_OK) return demo_refuse_context(context);
+    }
+    if (renderer->width < 1 || renderer->height < 1 || renderer->width > ES_RASTER_MAX_SIZE || renderer->height > ES_RASTER_MAX_SIZE)
+        return demo_refuse("an image of %ux%u: from 1x1 to %dx%d is accepted", renderer->width, renderer->height, ES_RASTER_MAX_SIZE, ES_RASTER_MAX_SIZE);
+    return DEMO_OK;
+}
+
+static int expect_nothing(const char* command, int count, char** arguments)
+{
+    return count ? demo_refuse("%s: takes no arguments, there is %s", command, arguments[0]) : DEMO_OK;
+}
+
+static void print_setting(const es_setting* setting)
+{
+    char range[512];
+    switch (setting->type) {
+    case ES_SETTING_BOOL: snprintf(range, sizeof range, "true|false"); break;
+    case ES_SETTING_CHOICE: snprintf(range, sizeof range, "%s", setting->choices); break;
+    default: snprintf(range, sizeof range, "%.9g … %.9g", setting->minimum, setting->maximum); break;
+    }
+    /* Padded by hand: printf counts the bytes of the ellipsis, not its one column. */
+    int columns = (int)strlen(range) - (strstr(range, "…") ? 2 : 0);
+    printf("%-22s %-10s %s%*s %s\n", setting->name, setting->default_text, range, columns < 26 ? 26 - columns : 0, "", setting->help);
+}
+
+int demo_settings(int count, char** arguments)
+{
+    if (expect_nothing("settings", count, arguments) != DEMO_OK) return DEMO_BAD_INPUT;
+    for (size_t i = 0; i < es_world_setting_count(); i++) print_setting(es_world_setting(i));
+    for (size_t i = 0; i < es_renderer_setting_count(); i++) print_setting(es_renderer_setting(i));
+    return DEMO_OK;
+}
+
+int demo_scenes(int count, char** arguments)
+{
+    if (expect_nothing("scenes", count, arguments) != DEMO_OK) return DEMO_BAD_INPUT;
+    for (size_t i = 0; i < es_scene_count(); i++) printf("%-12s %s\n", es_scene_name(i), es_scene_description(i));
+    return DEMO_OK;
+}
+
+int demo_images(int count, char** arguments)
+{
+    if (expect_nothing("images", count, arguments) != DEMO_OK) return DEMO_BAD_INPUT;
+    for (size_t i = 0; i < es_image_name_count(); i++) printf("%-18s %s\n", es_image_name(i), es_image_description(i));
+    return DEMO_OK;
+}
+
+int demo_find_image(const char* name)
+{
+    enum { MOST = 128 };
+    const char* names[MOST];
+    size_t count = 0;
+    for (size_t i = 0; i < es_image_name_count() && i < MOST; i++) {
+        if (!strcmp(es_image_name(i), name)) return (int)i;
+        names[count++] = es_image_name(i);
+    }
+    const char* nearest = demo_nearest(name, names, count);
+    if (nearest)
+        demo_refuse("--image %s: no such image; did you mean %s?", name, nearest);
+    else
+        demo_refuse("--image %s: no such image; `earthshine images` lists all", name);
+    return -1;
+}
