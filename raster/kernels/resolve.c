@@ -1,0 +1,383 @@
+/* Depth and triangle ids of a tile to the G-buffer's planes: every visible pixel once, eight at a time.
+ *
+ * Attributes are interpolated with homogeneous edge functions (Olano and Greer 1997, "Triangle Scan Conversion using 2D
+ * Homogeneous Coordinates"). With x_i = (window x * w)_i - X w_i relative to the pixel (X, Y), and y_i likewise,
+ *
+ *   b_0 = x_1 y_2 - x_2 y_1 (cyclic),  S = b_0 + b_1 + b_2,  lambda_i = b_i / S
+ *
+ * are perspective-correct barycentric coordinates, without clipping even where vertices lie behind the eye, and precise for tiny
+ * triangles because everything is relative to the pixel. S is linear in X and Y: with D = sum of b_i w_i, constant over the triangle,
+ * 1 / w = S / D, so the gradient of S is the plane's: the geometric normal comes without another fetch (es_resolve_job rows):
+ *
+ *   n = S_X (row_x - X row_w) + S_Y (row_y - Y row_w) + S row_w,   n · (eye - p) = -D
+ *
+ * Visibility is decided on snapped vertices, so a pixel centre can lie outside the unsnapped triangle; negative b_i / S are set to
+ * zero, which keeps attributes between those of the vertices even for slivers.
+ */
+#include "raster/kernel_table.h"
+#include "raster/kernels/texture_sampling.h"
+#include "raster/pack.h"
+#include "platform/simd.h"
+
+typedef struct v3 { vf x, y, z; } v3;
+typedef struct pixel8 { vi normal, geometric_normal, albedo_rg, albedo_b, surface, emission, instance, triangle; vf depth, motion_x, motion_y; } pixel8;
+
+VINL vf dot(v3 a, v3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+VINL v3 cross(v3 a, v3 b) { return (v3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+VINL v3 scale(v3 a, vf s) { return (v3){a.x * s, a.y * s, a.z * s}; }
+VINL v3 select3(vm m, v3 a, v3 b) { return (v3){vf_select(m, a.x, b.x), vf_select(m, a.y, b.y), vf_select(m, a.z, b.z)}; }
+/* has a direction: the sum of magnitudes is neither zero, too small or large, nor NaN */
+VINL vm directed(v3 a)
+{
+    vf s = vf_abs(a.x) + vf_abs(a.y) + vf_abs(a.z);
+    return vm_gt(s, vf_set1(1e-30f)) & vm_lt(s, vf_set1(1e30f));
+}
+/* unit; squares of what is directed may leave the range of floats, so the largest component is divided out first */
+VINL v3 unit(v3 a)
+{
+    vf largest = vf_max(vf_max(vf_abs(a.x), vf_abs(a.y)), vf_abs(a.z));
+    a = scale(a, vf_set1(1.0f) / vf_select(vm_gt(largest, vf_zero()), largest, vf_set1(1.0f)));
+    vf length = vf_sqrt(dot(a, a));
+    return scale(a, vf_set1(1.0f) / vf_select(vm_gt(length, vf_zero()), length, vf_set1(1.0f)));
+}
+
+/* The interpolation at eight pixels of one instance. */
+typedef struct surface8 {
+    const es_resolve_job* job;
+    const es_prepared_instance* instance;
+    vm active, back;             /* back: seen from the side where the winding is clockwise */
+    vi index[3];
+    vf x, y;                     /* pixel centres from the view's centre */
+    vf w[3], lambda[3];
+    vf bx[3], by[3], sum_x, sum_y, inverse;
+} surface8;
+
+VINL v3 interpolate3(const surface8* s, const float* stream, vf* fourth)
+{
+    vf a[4], b[4], c[4];
+    vf_gather4(stream, 16, s->index[0], &a[0], &a[1], &a[2], &a[3]);
+    vf_gather4(stream, 16, s->index[1], &b[0], &b[1], &b[2], &b[3]);
+    vf_gather4(stream, 16, s->index[2], &c[0], &c[1], &c[2], &c[3]);
+    if (fourth) *fourth = a[3] * s->lambda[0] + b[3] * s->lambda[1] + c[3] * s->lambda[2];
+    return (v3){a[0] * s->lambda[0] + b[0] * s->lambda[1] + c[0] * s->lambda[2], a[1] * s->lambda[0] + b[1] * s->lambda[1] + c[1] * s->lambda[2],
+        a[2] * s->lambda[0] + b[2] * s->lambda[1] + c[2] * s->lambda[2]};
+}
+
+VINL v3 transform3(const float m[9], v3 a)
+{
+    return (v3){vf_set1(m[0]) * a.x + vf_set1(m[1]) * a.y + vf_set1(m[2]) * a.z, vf_set1(m[3]) * a.x + vf_set1(m[4]) * a.y + vf_set1(m[5]) * a.z,
+        vf_set1(m[6]) * a.x + vf_set1(m[7]) * a.y + vf_set1(m[8]) * a.z};
+}
+
+/* Texture coordinates of a set with their exact derivatives: d(lambda_i) = (d(b_i) - lambda_i d(S)) / S. */
+static es_uv interpolate_uv(const surface8* s, uint32_t set)
+{
+    es_uv uv = {vf_zero(), vf_zero(), vf_zero(), vf_zero(), vf_zero(), vf_zero()};
+    const float* stream = s->instance->mesh->uvs;
+    if (!stream) return uv;
+    for (int k = 0; k < 3; k++) {
+        vf a[4];
+        vf_gather4(stream, 16, s->index[k], &a[0], &a[1], &a[2], &a[3]);
+        vf u = set ? a[2] : a[0], v = set ? a[3] : a[1];
+        vf l = s->lambda[k], lx = (s->bx[k] - l * s->sum_x) * s->inverse, ly = (s->by[k] - l * s->sum_y) * s->inverse;
+        uv.u = uv.u + l * u;
+        uv.v = uv.v + l * v;
+        uv.dudx = uv.dudx + lx * u;
+        uv.dvdx = uv.dvdx + lx * v;
+        uv.dudy = uv.dudy + ly * u;
+        uv.dvdy = uv.dvdy + ly * v;
+    }
+    return uv;
+}
+
+/* The normal map's normal in the frame of `normal` (unit). Tangents come from the mesh; without them from the directions in which
+ * u and v grow over the triangle, as the glTF sample viewer does; without texture coordinates the normal stays. */
+static v3 map_normal(const surface8* s, v3 normal, const es_rgba* texel)
+{
+    const es_prepared_instance* instance = s->instance;
+    const es_raster_mesh* mesh = instance->mesh;
+    v3 tangent;
+    vf handedness;
+    if (mesh->tangents) {
+        tangent = interpolate3(s, mesh->tangents, &handedness);
+        const float* m = instance->world;
+        tangent = (v3){vf_set1(m[0]) * tangent.x + vf_set1(m[1]) * tangent.y + vf_set1(m[2]) * tangent.z,
+            vf_set1(m[4]) * tangent.x + vf_set1(m[5]) * tangent.y + vf_set1(m[6]) * tangent.z,
+            vf_set1(m[8]) * tangent.x + vf_set1(m[9]) * tangent.y + vf_set1(m[10]) * tangent.z};
+        handedness = vf_copysign(vf_set1(instance->mirrored ? -1.0f : 1.0f), instance->mirrored ? vf_neg(handedness) : handedness);
+    } else {
+        if (!mesh->uvs) return normal;
+        v3 p[3];
+        vf u[3], v[3];
+        int set = instance->material->textures[ES_TEXTURE_NORMAL].uv_set ? 1 : 0;
+        for (int k = 0; k < 3; k++) {
+            vf a[4];
+            vf_gather4(mesh->positions, 16, s->index[k], &p[k].x, &p[k].y, &p[k].z, &a[3]);
+            vf_gather4(mesh->uvs, 16, s->index[k], &a[0], &a[1], &a[2], &a[3]);
+            u[k] = set ? a[2] : a[0];
+            v[k] = set ? a[3] : a[1];
+        }
+        v3 e1 = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z}, e2 = {p[2].x - p[0].x, p[2].y - p[0].y, p[2].z - p[0].z};
+        vf u1 = u[1] - u[0], v1 = v[1] - v[0], u2 = u[2] - u[0], v2 = v[2] - v[0];
+        vf determinant = u1 * v2 - u2 * v1, sign = vf_copysign(vf_set1(1.0f), determinant);
+        v3 along_u = scale((v3){e1.x * v2 - e2.x * v1, e1.y * v2 - e2.y * v1, e1.z * v2 - e2.z * v1}, sign);
+        v3 along_v = scale((v3){e2.x * u1 - e1.x * u2, e2.y * u1 - e1.y * u2, e2.z * u1 - e1.z * u2}, sign);
+        const float* m = instance->world;
+        const float linear[9] = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
+        tangent = transform3(linear, along_u);
+        along_v = transform3(linear, along_v);
+        /* images have v down, normal maps y up: the bitangent is against v */
+        handedness = vf_copysign(vf_set1(1.0f), vf_neg(dot(cross(normal, tangent), along_v)));
+    }
+    tangent = unit(tangent);
+    vf along = dot(tangent, normal);
+    tangent = (v3){tangent.x - normal.x * along, tangent.y - normal.y * along, tangent.z - normal.z * along};
+    vm usable = vm_gt(dot(tangent, tangent), vf_set1(1e-8f)); /* neither zero, NaN, nor along the normal */
+    tangent = unit(tangent);
+    v3 bitangent = scale(cross(normal, tangent), handedness);
+    vf two = vf_set1(2.0f), one = vf_set1(1.0f), strength = vf_set1(instance->material->normal_scale);
+    vf tx = (texel->r * two - one) * strength, ty = (texel->g * two - one) * strength, tz = texel->b * two - one;
+    v3 mapped = {tangent.x * tx + bitangent.x * ty + normal.x * tz, tangent.y * tx + bitangent.y * ty + normal.y * tz,
+        tangent.z * tx + bitangent.z * ty + normal.z * tz};
+    return select3(usable & vm_gt(dot(mapped, mapped), vf_set1(1e-8f)), mapped, normal);
+}
+
+/* The planes that textures change. Out of line: most pixels of untextured scenes never come here. */
+static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32_t planes, v3* normal, v3 geometric, es_rgba* color, pixel8* out)
+{
+    const es_prepared_material* material = s->instance->material;
+    const es_prepared_texture* textures = material->textures;
+    es_uv uv[2];
+    for (uint32_t set = 0; set < 2; set++) {
+        bool used = false;
+        for (int i = 0; i < ES_TEXTURE_COUNT; i++) used |= textures[i].image && (textures[i].uv_set != 0) == (set != 0);
+        if (used) uv[set] = interpolate_uv(s, set);
+    }
+#define ES_SAMPLE_(which) es_sample_texture(&textures[which], &uv[textures[which].uv_set ? 1 : 0], s->active)
+    if ((planes & ES_GBUFFER_NORMAL) && textures[ES_TEXTURE_NORMAL].image) {
+        es_rgba texel = ES_SAMPLE_(ES_TEXTURE_NORMAL);
+        v3 n = select3(directed(*normal), *normal, geometric);
+        *normal = map_normal(s, unit(n), &texel);
+    }
+    if ((planes & ES_GBUFFER_ALBEDO) && textures[ES_TEXTURE_BASE_COLOR].image) {
+        es_rgba texel = ES_SAMPLE_(ES_TEXTURE_BASE_COLOR);
+        color->r = color->r * texel.r;
+        color->g = color->g * texel.g;
+        color->b = color->b * texel.b;
+    }
+    if ((planes & ES_GBUFFER_SURFACE) && (textures[ES_TEXTURE_METALLIC_ROUGHNESS].image || textures[ES_TEXTURE_SPECULAR].image)) {
+        vf metallic = vf_set1(material->metallic), roughness = vf_set1(material->roughness), specular = vf_set1(material->specular);
+        if (textures[ES_TEXTURE_METALLIC_ROUGHNESS].image) {
+            es_rgba texel = ES_SAMPLE_(ES_TEXTURE_METALLIC_ROUGHNESS);
+            roughness = roughness * texel.g;
+            metallic = metallic * texel.b;
+        }
+        if (textures[ES_TEXTURE_SPECULAR].image) specular = specular * ES_SAMPLE_(ES_TEXTURE_SPECULAR).a;
+        vi second = material->model == ES_SURFACE_PHONG ? vi_set1((int32_t)(material->surface_word >> 8 & 0xff)) : es_pack_unorm8_v(roughness);
+        out->surface = es_pack_unorm8_v(metallic) | (second << 8) | (es_pack_unorm8_v(specular) << 16) | vi_set1((int32_t)(material->model << 24));
+    }
+    if ((planes & ES_GBUFFER_EMISSION) && textures[ES_TEXTURE_EMISSION].image) {
+        es_rgba texel = ES_SAMPLE_(ES_TEXTURE_EMISSION);
+        out->emission = es_pack_rgb9e5_v(vf_set1(material->emission[0]) * texel.r, vf_set1(material->emission[1]) * texel.g, vf_set1(material->emission[2]) * texel.b);
+    }
+#undef ES_SAMPLE_
+}
+
+VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance* instance, vm active, vi id, vf x, vf y, pixel8* out)
+{
+    const es_raster_mesh* mesh = instance->mesh;
+    const es_prepared_material* material = instance->material;
+    const uint32_t planes = job->gbuffer.planes;
+    surface8 s = {.job = job, .instance = instance, .active = active, .x = x, .y = y};
+
+    vi triangle = active & (id - vi_set1((int32_t)instance->first_id)), unused;
+    out->triangle = triangle + vi_set1(1);
+    out->instance = vi_set1((int32_t)(instance->instance_id + 1));
+    vi_gather4(mesh->indices, 12, triangle, &s.index[0], &s.index[1], &s.index[2], &unused);
+
+    vf xr[3], yr[3], z[3], b[3];
+    for (int k = 0; k < 3; k++) {
+        vf_gather4(job->vertices + instance->first_vertex, 16, s.index[k], &xr[k], &yr[k], &z[k], &s.w[k]);
+        xr[k] = xr[k] - x * s.w[k];
+        yr[k] = yr[k] - y * s.w[k];
+    }
+    b[0] = xr[1] * yr[2] - xr[2] * yr[1];
+    b[1] = xr[2] * yr[0] - xr[0] * yr[2];
+    b[2] = xr[0] * yr[1] - xr[1] * yr[0];
+    vf sum = b[0] + b[1] + b[2], zero = vf_zero();
+    vi sign = vi_from_bits(sum) & vi_set1(INT32_MIN);
+    vf c0 = vf_max(vf_from_bits(vi_from_bits(b[0]) ^ sign), zero), c1 = vf_max(vf_from_bits(vi_from_bits(b[1]) ^ sign), zero);
+    vf c2 = vf_max(vf_from_bits(vi_from_bits(b[2]) ^ sign), zero);
+    vf total = c0 + c1 + c2;
+    vm solid = vm_gt(total, zero);
+    vf inverse = vf_set1(1.0f) / vf_select(solid, total, vf_set1(1.0f));
+    s.lambda[0] = vf_select(solid, c0 * inverse, vf_set1(1.0f));
+    s.lambda[1] = c1 * inverse;
+    s.lambda[2] = c2 * inverse;
+    /* window y is down: counter-clockwise triangles have negative S */
+    if (instance->cull_positive == instance->cull_negative)
+        s.back = vm_lt(vf_from_bits(sign | vi_set1(0x3f800000)), zero) ^ (instance->mirrored ? vi_zero() : vm_all_lanes());
+    else /* one side is culled by the snapped area, which decides even where S rounds to the other sign */
+        s.back = instance->cull_positive == instance->mirrored ? vm_all_lanes() : vi_zero();
+
+    vf w = s.lambda[0] * s.w[0] + s.lambda[1] * s.w[1] + s.lambda[2] * s.w[2];
+    vf depth_z = s.lambda[0] * z[0] + s.lambda[1] * z[1] + s.lambda[2] * z[2];
+    vf distance = job->orthographic ? vf_set1(job->distance_offset) + vf_set1(job->distance_scale) * depth_z : w;
+    out->depth = vf_max(distance, vf_set1(1e-30f)); /* zero would say that nothing is seen */
+
+    bool gradients = (planes & (ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL)) || material->any_texture;
+    v3 geometric = {zero, zero, zero};
+    if (gradients) {
+        for (int k = 0; k < 3; k++) {
+            int i = k < 2 ? k + 1 : 0, j = i < 2 ? i + 1 : 0;
+            s.bx[k] = s.w[j] * yr[i] - s.w[i] * yr[j];
+            s.by[k] = s.w[i] * xr[j] - s.w[j] * xr[i];
+        }
+        s.sum_x = s.bx[0] + s.bx[1] + s.bx[2];
+        s.sum_y = s.by[0] + s.by[1] + s.by[2];
+        s.inverse = vf_from_bits(vi_from_bits(inverse) | sign);
+        if (job->orthographic) {
+            /* the plane of z over the window, times S; row_z points to the eye */
+            vf zx = s.bx[0] * z[0] + s.bx[1] * z[1] + s.bx[2] * z[2], zy = s.by[0] * z[0] + s.by[1] * z[1] + s.by[2] * z[2];
+            geometric = (v3){sum * vf_set1(job->row_z[0]) - zx * vf_set1(job->row_x[0]) - zy * vf_set1(job->row_y[0]),
+                sum * vf_set1(job->row_z[1]) - zx * vf_set1(job->row_x[1]) - zy * vf_set1(job->row_y[1]),
+                sum * vf_set1(job->row_z[2]) - zx * vf_set1(job->row_x[2]) - zy * vf_set1(job->row_y[2])};
+        } else {
+            vf along = s.sum_x * x + s.sum_y * y - sum;
+            geometric = (v3){along * vf_set1(job->row_w[0]) - s.sum_x * vf_set1(job->row_x[0]) - s.sum_y * vf_set1(job->row_y[0]),
+                along * vf_set1(job->row_w[1]) - s.sum_x * vf_set1(job->row_x[1]) - s.sum_y * vf_set1(job->row_y[1]),
+                along * vf_set1(job->row_w[2]) - s.sum_x * vf_set1(job->row_x[2]) - s.sum_y * vf_set1(job->row_y[2])};
+        }
+        geometric.x = vf_from_bits(vi_from_bits(geometric.x) ^ sign);
+        geometric.y = vf_from_bits(vi_from_bits(geometric.y) ^ sign);
+        geometric.z = vf_from_bits(vi_from_bits(geometric.z) ^ sign);
+        vf toward = job->orthographic ? vf_set1(1.0f) : vf_set1(-1.0f);
+        const float* eye = job->orthographic ? job->row_z : job->row_w;
+        v3 fallback = {vf_set1(eye[0]) * toward, vf_set1(eye[1]) * toward, vf_set1(eye[2]) * toward};
+        geometric = select3(directed(geometric), geometric, fallback);
+        if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) out->geometric_normal = es_pack_normal_v(geometric.x, geometric.y, geometric.z);
+    }
+
+    v3 normal = geometric;
+    bool own_normals = (planes & ES_GBUFFER_NORMAL) && mesh->normals;
+    if (own_normals) normal = transform3(instance->normal_matrix, interpolate3(&s, mesh->normals, NULL));
+    else if (material->any_texture) {
+        /* geometric normals point to the eye, the frame of a normal map to the front */
+        normal.x = vf_from_bits(vi_from_bits(normal.x) ^ (s.back & vi_set1(INT32_MIN)));
+        normal.y = vf_from_bits(vi_from_bits(normal.y) ^ (s.back & vi_set1(INT32_MIN)));
+        normal.z = vf_from_bits(vi_from_bits(normal.z) ^ (s.back & vi_set1(INT32_MIN)));
+    }
+
+    es_rgba color = {vf_set1(material->base_color[0]), vf_set1(material->base_color[1]), vf_set1(material->base_color[2]), vf_zero()};
+    if ((planes & ES_GBUFFER_ALBEDO) && mesh->colors) {
+        v3 c = interpolate3(&s, mesh->colors, NULL);
+        color.r = color.r * c.x;
+        color.g = color.g * c.y;
+        color.b = color.b * c.z;
+    }
+    out->surface = vi_set1((int32_t)material->surface_word);
+    out->emission = vi_set1((int32_t)material->emission_word);
+    if (material->any_texture) resolve_textures(&s, planes, &normal, geometric, &color, out);
+
+    if (planes & ES_GBUFFER_NORMAL) {
+        if (own_normals || material->any_texture) {
+            vi flip = s.back & vi_set1(INT32_MIN);
+            v3 turned = {vf_from_bits(vi_from_bits(normal.x) ^ flip), vf_from_bits(vi_from_bits(normal.y) ^ flip), vf_from_bits(vi_from_bits(normal.z) ^ flip)};
+            normal = select3(directed(turned), turned, geometric);
+            out->normal = es_pack_normal_v(normal.x, normal.y, normal.z);
+        } else {
+            out->normal = es_pack_normal_v(geometric.x, geometric.y, geometric.z);
+        }
+    }
+    if (planes & ES_GBUFFER_ALBEDO) {
+        out->albedo_rg = es_pack_unorm16_v(color.r) | (es_pack_unorm16_v(color.g) << 16);
+        out->albedo_b = es_pack_unorm16_v(color.b) | vi_set1((int32_t)(instance->material_index << 16));
+    }
+
+    out->motion_x = out->motion_y = zero;
+    if ((planes & ES_GBUFFER_MOTION) && (instance->moving || instance->has_deltas)) {
+        /* change of the homogeneous window position since last frame, so that what stands still has motion zero exactly:
+         * X - (X w + dx) / (w + dw) = (X dw - dx) / (w + dw) */
+        vf dx, dy, dw;
+        if (instance->has_deltas) {
+            v3 d = interpolate3(&s, &job->deltas[instance->first_delta].xw, &dw);
+            dx = d.x;
+            dy = d.y;
+        } else {
+            const float* m = instance->motion;
+            vf xw = x * w, yw = y * w;
+            dx = vf_set1(m[0]) * xw + vf_set1(m[1]) * yw + vf_set1(m[2]) * depth_z + vf_set1(m[3]) * w;
+            dy = vf_set1(m[4]) * xw + vf_set1(m[5]) * yw + vf_set1(m[6]) * depth_z + vf_set1(m[7]) * w;
+            dw = vf_set1(m[8]) * xw + vf_set1(m[9]) * yw + vf_set1(m[10]) * depth_z + vf_set1(m[11]) * w;
+        }
+        vf then = w + dw;
+        vm before = vm_gt(then, zero);
+        vf inverse_then = vf_set1(1.0f) / vf_select(before, then, vf_set1(1.0f));
+        vf away = vf_set1(ES_MOTION_BEHIND);
+        vf mx = vf_clamp((x * dw - dx) * inverse_then, vf_neg(away), away), my = vf_clamp((y * dw - dy) * inverse_then, vf_neg(away), away);
+        out->motion_x = vf_select(before, mx, away);
+        out->motion_y = vf_select(before, my, away);
+    }
+}
+
+VINL void merge(vm m, pixel8* to, const pixel8* from)
+{
+    to->normal = vi_select(m, from->normal, to->normal);
+    to->geometric_normal = vi_select(m, from->geometric_normal, to->geometric_normal);
+    to->albedo_rg = vi_select(m, from->albedo_rg, to->albedo_rg);
+    to->albedo_b = vi_select(m, from->albedo_b, to->albedo_b);
+    to->surface = vi_select(m, from->surface, to->surface);
+    to->emission = vi_select(m, from->emission, to->emission);
+    to->instance = vi_select(m, from->instance, to->instance);
+    to->triangle = vi_select(m, from->triangle, to->triangle);
+    to->depth = vf_select(m, from->depth, to->depth);
+    to->motion_x = vf_select(m, from->motion_x, to->motion_x);
+    to->motion_y = vf_select(m, from->motion_y, to->motion_y);
+}
+
+void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
+{
+    const es_gbuffer* g = &job->gbuffer;
+    const uint32_t columns = g->width - (uint32_t)tile->x < ES_TILE_SIZE ? g->width - (uint32_t)tile->x : ES_TILE_SIZE;
+    const uint32_t rows = g->height - (uint32_t)tile->y < ES_TILE_SIZE ? g->height - (uint32_t)tile->y : ES_TILE_SIZE;
+    for (uint32_t row = 0; row < rows; row++) {
+        size_t line = (size_t)((uint32_t)tile->y + row) * g->stride + (uint32_t)tile->x;
+        vf y = vf_set1((float)(tile->y + (int32_t)row) + 0.5f - 0.5f * (float)tile->height);
+        for (uint32_t column = 0; column < columns; column += VW) {
+            uint32_t at = row * ES_TILE_PITCH + column;
+            vm seen = vm_gt(vf_load(tile->depth + at), vf_zero()) & vm_first((int32_t)(columns - column));
+            uint32_t pending = vm_bits(seen);
+            job->pixels += (uint32_t)__builtin_popcount(pending);
+            pixel8 out;
+            memset(&out, 0, sizeof out);
+            if (pending) {
+                vi id = seen & vi_load(tile->id + at);
+                vf x = vf_set1((float)(tile->x + (int32_t)column) + 0.5f - 0.5f * (float)tile->width) + vf_iota();
+                vi instance = vi_gather(job->chunk_instance, vi_shift_right_logical(id, ES_CHUNK_BITS));
+                while (pending) {
+                    int32_t which = instance[__builtin_ctz(pending)];
+                    vm active = seen & vi_eq(instance, vi_set1(which));
+                    pixel8 part;
+                    memset(&part, 0, sizeof part);
+                    resolve_instance(job, &job->instances[which], active, id, x, y, &part);
+                    merge(active, &out, &part);
+                    pending &= ~vm_bits(active);
+                }
+            }
+            size_t p = line + column;
+            if (g->depth) vf_store(g->depth + p, out.depth);
+            if (g->normal) vi_store(g->normal + p, out.normal);
+            if (g->geometric_normal) vi_store(g->geometric_normal + p, out.geometric_normal);
+            if (g->albedo_rg) vi_store(g->albedo_rg + p, out.albedo_rg);
+            if (g->albedo_b) vi_store(g->albedo_b + p, out.albedo_b);
+            if (g->surface) vi_store(g->surface + p, out.surface);
+            if (g->emission) vi_store(g->emission + p, out.emission);
+            if (g->motion_x) {
+                vf_store(g->motion_x + p, out.motion_x);
+                vf_store(g->motion_y + p, out.motion_y);
+            }
+            if (g->instance) vi_store(g->instance + p, out.instance);
+            if (g->triangle) vi_store(g->triangle + p, out.triangle);
+        }
+    }
+}
