@@ -74,32 +74,29 @@ if [ -z "$matrix" ]; then
     every_way "this build" "$build/frame_hashes" 1 2 3 8
 else
     for compiler in gcc clang; do
-        cxx=${compiler/gcc/g++}
-        [ $compiler = clang ] && cxx=clang++
-        if ! command -v $compiler >/dev/null || ! command -v $cxx >/dev/null; then
+        if ! command -v $compiler >/dev/null; then
             echo "skipped: $compiler is not installed"
             skipped_one=1
             continue
         fi
         for level in -O1 -O3; do
             folder=$work/$compiler$level
-            if configure_and_build "$folder" -DCMAKE_C_COMPILER=$compiler -DCMAKE_CXX_COMPILER=$cxx -DEARTHSHINE_OPTIMIZE=$level; then
+            if configure_and_build "$folder" -DCMAKE_C_COMPILER=$compiler -DEARTHSHINE_OPTIMIZE=$level; then
                 every_way "$compiler $level" "$folder/frame_hashes" 1 2 3 8
             fi
         done
     done
 
     # An emulated processor is some thirty times slower: two scenes, and neither 2 nor 8 threads.
-    if command -v aarch64-linux-gnu-gcc >/dev/null && command -v aarch64-linux-gnu-g++ >/dev/null && command -v qemu-aarch64 >/dev/null; then
+    if command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null; then
         folder=$work/aarch64
         if configure_and_build "$folder" -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
-            -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ \
-            "-DCMAKE_CROSSCOMPILING_EMULATOR=qemu-aarch64;-L;/usr/aarch64-linux-gnu"; then
+            -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc "-DCMAKE_CROSSCOMPILING_EMULATOR=qemu-aarch64;-L;/usr/aarch64-linux-gnu"; then
             scenes="cornell parts"
             every_way "aarch64" "qemu-aarch64 -L /usr/aarch64-linux-gnu $folder/frame_hashes" 1 3
         fi
     else
-        echo "skipped: aarch64 needs aarch64-linux-gnu-gcc, aarch64-linux-gnu-g++ and qemu-aarch64"
+        echo "skipped: aarch64 needs aarch64-linux-gnu-gcc and qemu-aarch64"
         skipped_one=1
     fi
 fi
