@@ -24,7 +24,7 @@ es_result es_image_create(es_context* context, uint32_t width, uint32_t height, 
     }
     es_image made = {.width = width, .height = height, .channels = channels};
     made.pixels = es_allocate_zero(context, pixels_size(&made));
-    made.channel_names = es_allocate_zero(context, channels * sizeof *made.channel_names);
+    if (made.pixels) made.channel_names = es_allocate_zero(context, channels * sizeof *made.channel_names);
     if (!made.pixels || !made.channel_names) {
         es_image_destroy(context, &made);
         return es_context_last_result(context);

@@ -36,6 +36,7 @@ enum { PNG_BLOCK_HEADER = 64 };
 static png_voidp job_malloc(png_structp png, png_alloc_size_t size)
 {
     png_job* job = png_get_mem_ptr(png);
+    if (job->out_of_memory) return NULL;  /* zlib asks for several blocks before it looks at the first: one message is enough */
     png_block* block = size < SIZE_MAX - PNG_BLOCK_HEADER ? es_allocate(job->context, size + PNG_BLOCK_HEADER) : NULL;
     if (!block) {
         job->out_of_memory = true;
@@ -169,10 +170,12 @@ es_result es_image_read_png(es_context* context, const es_image_source* source, 
                                  : es_fail(context, ES_NOT_BUILT, "libpng at run time does not fit the one built against");
     }
     es_result result = ES_OK;
-    if (setjmp(png_jmpbuf(job.png)) == 0) {
-        read_all(&job, image);
-    } else if (job.out_of_memory) {
+    bool done = setjmp(png_jmpbuf(job.png)) == 0;
+    if (done) read_all(&job, image);
+    if (job.out_of_memory) {  /* libpng does without some optional things; a file read for less is still a failure */
         result = es_context_last_result(context);
+    } else if (done) {
+        result = ES_OK;
     } else if (image->width > ES_IMAGE_MAX_SIZE || image->height > ES_IMAGE_MAX_SIZE) {
         result = es_fail(context, ES_IMAGE_SIZE, "'%s' is %u x %u; 1 to %d are accepted", source->label, image->width, image->height,
             ES_IMAGE_MAX_SIZE);
@@ -234,10 +237,11 @@ es_result es_image_write_png(es_context* context, const es_image* image, const e
                                  : es_fail(context, ES_NOT_BUILT, "libpng at run time does not fit the one built against");
     }
     es_result result = ES_OK;
-    if (setjmp(png_jmpbuf(job.png)) == 0) write_all(&job, image, desc->already_srgb);
-    else if (job.out_of_memory) result = es_context_last_result(context);
+    bool done = setjmp(png_jmpbuf(job.png)) == 0;
+    if (done) write_all(&job, image, desc->already_srgb);
+    if (job.out_of_memory) result = es_context_last_result(context);
     else if (es_sink_failed(sink)) result = ES_FILE_WRITE;
-    else result = es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", label, job.message);
+    else if (!done) result = es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", label, job.message);
     png_destroy_write_struct(&job.png, &job.info);
     release_buffers(&job);
     return result;
