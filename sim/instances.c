@@ -1,0 +1,166 @@
+/* Instances, and the draw list made of them.
+ *
+ * The list is rebuilt when an instance, a mesh or a matrix may differ, and the geometry revision goes up only where an
+ * entry really does. Its material table is the default material followed by the material slots, so that a material keeps
+ * its index for life. */
+#include "sim/world.h"
+
+#include <string.h>
+
+#include "platform/maths.h"
+
+static es_result check_desc(es_world* world, const es_instance_desc* desc)
+{
+    if (!es_world_object(world, ES_OBJECT_MESH, desc->mesh.id)) return ES_STALE_HANDLE;
+    if (desc->node.id && !es_world_object(world, ES_OBJECT_NODE, desc->node.id)) return ES_STALE_HANDLE;
+    if (desc->material.id && !es_world_object(world, ES_OBJECT_MATERIAL, desc->material.id)) return ES_STALE_HANDLE;
+    return ES_OK;
+}
+
+static void exchange_references(es_world* world, const es_instance_desc* from, const es_instance_desc* to)
+{
+    es_world_rereference(world, ES_OBJECT_MESH, from->mesh.id, to->mesh.id);
+    es_world_rereference(world, ES_OBJECT_NODE, from->node.id, to->node.id);
+    es_world_rereference(world, ES_OBJECT_MATERIAL, from->material.id, to->material.id);
+}
+
+es_result es_world_add_instance(es_world* world, const es_instance_desc* desc, es_instance* instance)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    if (!desc || !instance) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_add_instance: desc and instance must not be NULL");
+    *instance = (es_instance){0};
+    es_result result = check_desc(world, desc);
+    if (result != ES_OK) return result;
+    size_t needed = world->slots[ES_OBJECT_INSTANCE].slot_count + (size_t)1;
+    if (!es_grow(world->context, (void**)&world->drawn, &world->drawn_capacity, world->list.instance_count, needed, sizeof *world->drawn))
+        return es_context_last_result(world->context);
+    world->list.instances = world->drawn;
+    es_instance_object* object = es_slots_add(world->context, &world->slots[ES_OBJECT_INSTANCE], "instance", NULL);
+    if (!object) return es_context_last_result(world->context);
+    object->desc = *desc;
+    exchange_references(world, &(es_instance_desc){0}, desc);
+    world->list_dirty = world->geometry_touched = true;
+    instance->id = object->object.id;
+    return ES_OK;
+}
+
+es_result es_world_set_instance(es_world* world, es_instance instance, const es_instance_desc* desc)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    es_instance_object* object = es_world_object(world, ES_OBJECT_INSTANCE, instance.id);
+    if (!object) return ES_STALE_HANDLE;
+    if (!desc) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_set_instance: desc must not be NULL");
+    es_result result = check_desc(world, desc);
+    if (result != ES_OK) return result;
+    es_instance_desc* now = &object->desc;
+    if (now->node.id == desc->node.id && now->mesh.id == desc->mesh.id && now->material.id == desc->material.id && now->hidden == desc->hidden)
+        return ES_OK;
+    exchange_references(world, now, desc);
+    *now = *desc;
+    world->list_dirty = world->geometry_touched = true;
+    return ES_OK;
+}
+
+es_result es_world_get_instance(const es_world* world, es_instance instance, es_instance_desc* desc)
+{
+    if (!world || !desc) return ES_INVALID_ARGUMENT;
+    es_instance_object* object = es_world_object(world, ES_OBJECT_INSTANCE, instance.id);
+    if (!object) return ES_STALE_HANDLE;
+    *desc = object->desc;
+    return ES_OK;
+}
+
+es_result es_world_destroy_instance(es_world* world, es_instance instance)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    es_instance_object* object = es_world_object(world, ES_OBJECT_INSTANCE, instance.id);
+    if (!object) return ES_STALE_HANDLE;
+    exchange_references(world, &object->desc, &(es_instance_desc){0});
+    es_slots_remove(world->context, &world->slots[ES_OBJECT_INSTANCE], &object->object);
+    world->list_dirty = world->geometry_touched = true;
+    return ES_OK;
+}
+
+/* Box of a transformed box by centre and half extent; false when it leaves the world's extent. */
+static bool transformed_box(const es_mat4* matrix, es_vec3 low, es_vec3 high, es_vec3* out_low, es_vec3* out_high)
+{
+    float centre[3] = {0.5f * low.x + 0.5f * high.x, 0.5f * low.y + 0.5f * high.y, 0.5f * low.z + 0.5f * high.z};
+    float half[3] = {0.5f * high.x - 0.5f * low.x, 0.5f * high.y - 0.5f * low.y, 0.5f * high.z - 0.5f * low.z};
+    float a[3], b[3];
+    bool good = true;
+    for (int row = 0; row < 3; row++) {
+        float c = matrix->m[12 + row], h = 0;
+        for (int k = 0; k < 3; k++) {
+            c += matrix->m[4 * k + row] * centre[k];
+            h += es_absf(matrix->m[4 * k + row]) * half[k];
+        }
+        a[row] = c - h;
+        b[row] = c + h;
+        good &= a[row] >= -ES_WORLD_EXTENT && b[row] <= ES_WORLD_EXTENT;
+    }
+    *out_low = es_v3(a[0], a[1], a[2]);
+    *out_high = es_v3(b[0], b[1], b[2]);
+    return good;
+}
+
+void es_draw_list_refresh(es_world* world)
+{
+    if (!world->list_dirty) return;
+    world->list_dirty = false;
+    bool differs = world->geometry_touched;
+    world->geometry_touched = false;
+    const es_slots* slots = &world->slots[ES_OBJECT_INSTANCE];
+    uint32_t count = 0;
+    world->instances_moving = world->has_bounds = false;
+    for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
+        es_instance_object* object = es_slots_at(slots, slot);
+        if (!object || object->desc.hidden) continue;
+        const es_mesh_object* mesh = es_slots_get(&world->slots[ES_OBJECT_MESH], object->desc.mesh.id);
+        if (mesh->raster.triangle_count == 0) continue;
+        const es_mat4* now = es_node_world(world, object->desc.node);
+        const es_mat4* last = es_node_previous(world, object->desc.node);
+        es_vec3 low, high;
+        if (!transformed_box(now, mesh->raster.bounds_min, mesh->raster.bounds_max, &low, &high)) {
+            if (!object->warned)
+                es_log(world->context, ES_LOG_WARNING, ES_ASSET_WARNING, "an instance of mesh '%.64s' is left out while it lies beyond 1e9 m",
+                    mesh->object.name ? mesh->object.name : "");
+            object->warned = true;
+            continue;
+        }
+        if (!es_all_within(last->m, 16, ES_WORLD_EXTENT)) last = now;
+        uint32_t material = object->desc.material.id ? es_slot_of(object->desc.material.id) + 1 : 0;
+        es_raster_instance* entry = &world->drawn[count];
+        differs |= count >= world->list.instance_count || entry->id != slot || entry->mesh != &mesh->raster || entry->material != material ||
+                   memcmp(&entry->transform, now, sizeof *now) != 0;
+        *entry = (es_raster_instance){&mesh->raster, material, slot, *now, *last};
+        world->instances_moving |= mesh->moving || memcmp(now, last, sizeof *now) != 0;
+        if (count++ == 0) {
+            world->bounds_min = low;
+            world->bounds_max = high;
+            world->has_bounds = true;
+        }
+        es_vec3 *a = &world->bounds_min, *b = &world->bounds_max;
+        *a = es_v3(es_minf(a->x, low.x), es_minf(a->y, low.y), es_minf(a->z, low.z));
+        *b = es_v3(es_maxf(b->x, high.x), es_maxf(b->y, high.y), es_maxf(b->z, high.z));
+    }
+    differs |= count != world->list.instance_count;
+    world->list.instance_count = count;
+    if (differs) world->revisions.geometry++;
+}
+
+const es_draw_list* es_world_draw_list(const es_world* world)
+{
+    if (!world) return NULL;
+    es_world_refresh(world);
+    return &world->list;
+}
+
+bool es_world_bounds(const es_world* world, es_vec3* minimum, es_vec3* maximum)
+{
+    if (!world) return false;
+    es_world_refresh(world);
+    if (!world->has_bounds) return false;
+    if (minimum) *minimum = world->bounds_min;
+    if (maximum) *maximum = world->bounds_max;
+    return true;
+}

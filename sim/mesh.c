@@ -1,0 +1,281 @@
+/* Meshes: streams of four floats as raster/raster.h wants them, smooth normals, deformation. */
+#include "sim/world.h"
+
+#include <string.h>
+
+#include "platform/maths.h"
+
+/* 3 × triangle_count and 4 × vertex_count stay below 2^31, what 32-bit gathers can address */
+enum { MAX_VERTICES = 1 << 28, MAX_TRIANGLES = 1 << 28, STREAM_PAD = 8 };
+
+static size_t padded(uint32_t vertex_count)
+{
+    size_t count = ((size_t)vertex_count + STREAM_PAD - 1) / STREAM_PAD * STREAM_PAD;
+    return count ? count : STREAM_PAD;
+}
+static size_t stream_bytes(uint32_t vertex_count) { return padded(vertex_count) * 4 * sizeof(float); }
+static size_t index_bytes(uint32_t triangle_count) { return ((size_t)triangle_count * 3 + 1) * sizeof(uint32_t); }
+
+static const char* label(const char* name) { return name ? name : ""; }
+
+/* A stream from `components` floats per vertex; missing components come from `fill`, padding vertices repeat vertex 0. */
+static void write_stream(float* stream, const float* source, int components, const float fill[4], uint32_t vertex_count)
+{
+    size_t total = padded(vertex_count);
+    for (size_t v = 0; v < total; v++) {
+        size_t from = v < vertex_count ? v : 0;
+        for (int c = 0; c < 4; c++) stream[4 * v + c] = c < components && vertex_count ? source[from * components + c] : fill[c];
+    }
+}
+
+/* Normals smooth over the triangles that share a vertex index, weighted by area, summed in triangle order in double: the
+ * cross product of differences up to 2e9 and its square fit easily. Vertices without area point up. */
+static bool smooth_normals(es_context* context, const float* positions, const uint32_t* indices, uint32_t vertex_count, uint32_t triangle_count, float* normals)
+{
+    size_t bytes = (size_t)vertex_count * 3 * sizeof(double);
+    double* sum = es_allocate_zero(context, bytes);
+    if (!sum) return false;
+    for (uint32_t t = 0; t < triangle_count; t++) {
+        const float *a = positions + 4 * (size_t)indices[3 * t], *b = positions + 4 * (size_t)indices[3 * t + 1], *c = positions + 4 * (size_t)indices[3 * t + 2];
+        double ux = (double)b[0] - a[0], uy = (double)b[1] - a[1], uz = (double)b[2] - a[2];
+        double vx = (double)c[0] - a[0], vy = (double)c[1] - a[1], vz = (double)c[2] - a[2];
+        double n[3] = {uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx};
+        for (int corner = 0; corner < 3; corner++)
+            for (int k = 0; k < 3; k++) sum[3 * (size_t)indices[3 * t + corner] + k] += n[k];
+    }
+    size_t total = padded(vertex_count);
+    for (size_t v = 0; v < total; v++) {
+        const double* n = sum + 3 * (v < vertex_count ? v : 0);
+        double squared = vertex_count ? n[0] * n[0] + n[1] * n[1] + n[2] * n[2] : 0, length = __builtin_sqrt(squared);
+        bool good = squared >= 1e-280;
+        for (int k = 0; k < 3; k++) normals[4 * v + k] = good ? (float)(n[k] / length) : k == 1;
+        normals[4 * v + 3] = 0;
+    }
+    es_release(context, sum, bytes);
+    return true;
+}
+
+static bool direction_usable(const float* n)
+{
+    double squared = (double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2];
+    return squared > 1e-12 && squared < 1e12;
+}
+
+static void update_bounds(es_mesh_object* mesh)
+{
+    es_raster_mesh* raster = &mesh->raster;
+    es_vec3 low = {0, 0, 0}, high = {0, 0, 0};
+    for (int pass = 0; pass < (raster->previous_positions ? 2 : 1); pass++) {
+        const float* p = pass ? raster->previous_positions : raster->positions;
+        for (uint32_t v = 0; v < raster->vertex_count; v++, p += 4) {
+            if (pass == 0 && v == 0) low = high = es_v3(p[0], p[1], p[2]);
+            low = es_v3(es_minf(low.x, p[0]), es_minf(low.y, p[1]), es_minf(low.z, p[2]));
+            high = es_v3(es_maxf(high.x, p[0]), es_maxf(high.y, p[1]), es_maxf(high.z, p[2]));
+        }
+    }
+    raster->bounds_min = low;
+    raster->bounds_max = high;
+}
+
+void es_mesh_object_free(es_world* world, es_mesh_object* mesh)
+{
+    size_t bytes = stream_bytes(mesh->raster.vertex_count);
+    float* streams[] = {mesh->positions, mesh->previous, mesh->rest, mesh->rest_normals, mesh->normals, mesh->tangents, mesh->uvs, mesh->colors};
+    for (size_t i = 0; i < sizeof streams / sizeof streams[0]; i++) es_release(world->context, streams[i], bytes);
+    es_release(world->context, mesh->indices, index_bytes(mesh->raster.triangle_count));
+}
+
+static es_result check_desc(es_world* world, const es_mesh_desc* desc)
+{
+    es_context* context = world->context;
+    const char* name = label(desc->name);
+    if (desc->vertex_count > MAX_VERTICES || desc->triangle_count > MAX_TRIANGLES)
+        return es_fail(context, ES_INVALID_ARGUMENT, "mesh '%.64s': %u vertices and %u triangles; at most 2^28 of each are accepted", name, desc->vertex_count, desc->triangle_count);
+    if ((desc->vertex_count && !desc->positions) || (desc->triangle_count && !desc->indices))
+        return es_misuse(context, ES_INVALID_ARGUMENT, "mesh '%.64s': positions and indices must not be NULL", name);
+    for (size_t v = 0; v < desc->vertex_count; v++)
+        if (!es_all_within(desc->positions + 3 * v, 3, ES_WORLD_EXTENT))
+            return es_fail(context, ES_INVALID_ARGUMENT, "mesh '%.64s': vertex %zu must be finite and within 1e9", name, v);
+    const struct { const float* data; int components; const char* what; } others[] = {
+        {desc->normals, 3, "normal"}, {desc->tangents, 4, "tangent"}, {desc->uv0, 2, "uv0"}, {desc->uv1, 2, "uv1"}, {desc->colors, 4, "colour"}};
+    for (size_t k = 0; k < sizeof others / sizeof others[0]; k++)
+        for (size_t i = 0; others[k].data && i < (size_t)desc->vertex_count * others[k].components; i++)
+            if (!es_within(others[k].data[i], -ES_WORLD_EXTENT, ES_WORLD_EXTENT))
+                return es_fail(context, ES_INVALID_ARGUMENT, "mesh '%.64s': the %s of vertex %zu must be finite and within 1e9", name, others[k].what, i / others[k].components);
+    for (size_t i = 0; i < (size_t)desc->triangle_count * 3; i++)
+        if (desc->indices[i] >= desc->vertex_count)
+            return es_fail(context, ES_INVALID_ARGUMENT, "mesh '%.64s': triangle %zu names vertex %u of %u", name, i / 3, desc->indices[i], desc->vertex_count);
+    return ES_OK;
+}
+
+/* Fills an already referenced mesh object; false when memory ran out, to be freed by the caller. */
+static bool fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc)
+{
+    static const float position[4] = {0, 0, 0, 1}, zero[4] = {0, 0, 0, 0}, white[4] = {1, 1, 1, 1};
+    es_context* context = world->context;
+    uint32_t count = desc->vertex_count;
+    size_t bytes = stream_bytes(count);
+    mesh->raster.vertex_count = count;
+    mesh->raster.triangle_count = desc->triangle_count;
+    mesh->positions = es_allocate(context, bytes);
+    mesh->indices = es_allocate(context, index_bytes(desc->triangle_count));
+    if (!mesh->positions || !mesh->indices) return false;
+    write_stream(mesh->positions, desc->positions, 3, position, count);
+    if (desc->triangle_count) memcpy(mesh->indices, desc->indices, (size_t)desc->triangle_count * 3 * sizeof(uint32_t));
+    mesh->indices[(size_t)desc->triangle_count * 3] = 0;
+
+    if (desc->normals || !desc->flat_normals) {
+        mesh->normals = es_allocate(context, bytes);
+        if (!mesh->normals) return false;
+        bool usable = desc->normals != NULL;
+        for (uint32_t v = 0; usable && v < count; v++) usable = direction_usable(desc->normals + 3 * (size_t)v);
+        if (!usable && !smooth_normals(context, mesh->positions, mesh->indices, count, desc->triangle_count, mesh->normals)) return false;
+        /* a given normal without a direction is replaced by the computed one */
+        if (usable) write_stream(mesh->normals, desc->normals, 3, zero, count);
+        else if (desc->normals)
+            for (uint32_t v = 0; v < count; v++)
+                if (direction_usable(desc->normals + 3 * (size_t)v)) memcpy(mesh->normals + 4 * (size_t)v, desc->normals + 3 * (size_t)v, 3 * sizeof(float));
+    }
+    if (desc->tangents) {
+        mesh->tangents = es_allocate(context, bytes);
+        if (!mesh->tangents) return false;
+        write_stream(mesh->tangents, desc->tangents, 4, zero, count);
+        for (size_t v = 0; v < padded(count); v++) mesh->tangents[4 * v + 3] = mesh->tangents[4 * v + 3] < 0 ? -1.0f : 1.0f;
+    }
+    if (desc->uv0 || desc->uv1) {
+        mesh->uvs = es_allocate_zero(context, bytes);
+        if (!mesh->uvs) return false;
+        for (size_t v = 0; v < count; v++) {
+            if (desc->uv0) memcpy(mesh->uvs + 4 * v, desc->uv0 + 2 * v, 2 * sizeof(float));
+            if (desc->uv1) memcpy(mesh->uvs + 4 * v + 2, desc->uv1 + 2 * v, 2 * sizeof(float));
+        }
+    }
+    if (desc->colors) {
+        mesh->colors = es_allocate(context, bytes);
+        if (!mesh->colors) return false;
+        write_stream(mesh->colors, desc->colors, 4, white, count);
+    }
+    es_raster_mesh* raster = &mesh->raster;
+    raster->positions = mesh->positions;
+    raster->normals = mesh->normals;
+    raster->tangents = mesh->tangents;
+    raster->uvs = mesh->uvs;
+    raster->colors = mesh->colors;
+    raster->indices = mesh->indices;
+    update_bounds(mesh);
+    return true;
+}
+
+es_result es_world_add_mesh(es_world* world, const es_mesh_desc* desc, es_mesh* mesh)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    if (!desc || !mesh) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_add_mesh: desc and mesh must not be NULL");
+    *mesh = (es_mesh){0};
+    es_fp_environment environment = es_fp_enter();
+    es_result result = check_desc(world, desc);
+    if (result == ES_OK) {
+        es_mesh_object* object = es_slots_add(world->context, &world->slots[ES_OBJECT_MESH], "mesh", desc->name);
+        if (object && fill(world, object, desc)) {
+            mesh->id = object->object.id;
+        } else {
+            result = es_context_last_result(world->context);
+            if (object) {
+                es_mesh_object_free(world, object);
+                es_slots_remove(world->context, &world->slots[ES_OBJECT_MESH], &object->object);
+            }
+        }
+    }
+    es_fp_leave(environment);
+    return result;
+}
+
+es_result es_world_destroy_mesh(es_world* world, es_mesh mesh)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    es_mesh_object* object = es_world_object(world, ES_OBJECT_MESH, mesh.id);
+    if (!object) return ES_STALE_HANDLE;
+    if (object->object.references)
+        return es_misuse(world->context, ES_WRONG_STATE, "mesh '%.64s' cannot be destroyed: %u instances use it", label(object->object.name), object->object.references);
+    es_mesh_object_free(world, object);
+    es_slots_remove(world->context, &world->slots[ES_OBJECT_MESH], &object->object);
+    return ES_OK;
+}
+
+bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh)
+{
+    size_t bytes = stream_bytes(mesh->raster.vertex_count);
+    if (!mesh->previous) {
+        mesh->previous = es_allocate(world->context, bytes);
+        if (!mesh->previous) return false;
+    }
+    if (!mesh->rest) {
+        mesh->rest = es_allocate(world->context, bytes);
+        if (!mesh->rest) return false;
+        memcpy(mesh->rest, mesh->positions, bytes);
+    }
+    if (mesh->normals && !mesh->rest_normals) {
+        mesh->rest_normals = es_allocate(world->context, bytes);
+        if (!mesh->rest_normals) return false;
+        memcpy(mesh->rest_normals, mesh->normals, bytes);
+    }
+    return true;
+}
+
+es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* positions, const float* normals)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    es_mesh_object* object = es_world_object(world, ES_OBJECT_MESH, mesh.id);
+    if (!object) return ES_STALE_HANDLE;
+    const char* name = label(object->object.name);
+    size_t count = object->raster.vertex_count;
+    if (!positions) return es_misuse(world->context, ES_INVALID_ARGUMENT, "mesh '%.64s': new positions must not be NULL", name);
+    if (normals && !object->normals) return es_fail(world->context, ES_INVALID_ARGUMENT, "mesh '%.64s' stores no normals: pass NULL", name);
+    if (!es_all_within(positions, 3 * count, ES_WORLD_EXTENT) || (normals && !es_all_within(normals, 3 * count, ES_WORLD_EXTENT)))
+        return es_fail(world->context, ES_INVALID_ARGUMENT, "mesh '%.64s': new vertices must be finite and within 1e9", name);
+    if (!es_mesh_make_deformable(world, object)) return es_context_last_result(world->context);
+
+    bool differs = false;
+    for (size_t v = 0; v < count && !differs; v++)
+        differs = memcmp(object->positions + 4 * v, positions + 3 * v, 3 * sizeof(float)) != 0 ||
+                  (normals && memcmp(object->normals + 4 * v, normals + 3 * v, 3 * sizeof(float)) != 0);
+    if (!differs) return ES_OK;
+    if (!object->moving && world->stepped) { /* the first change since the step began: what is there now is last frame's */
+        memcpy(object->previous, object->positions, stream_bytes(object->raster.vertex_count));
+        object->raster.previous_positions = object->previous;
+        object->moving = true;
+    }
+    object->deformed = true;
+    for (size_t v = 0, total = padded(object->raster.vertex_count); v < total; v++) {
+        size_t from = v < count ? v : 0;
+        memcpy(object->positions + 4 * v, positions + 3 * from, 3 * sizeof(float));
+        if (normals && direction_usable(normals + 3 * from)) memcpy(object->normals + 4 * v, normals + 3 * from, 3 * sizeof(float));
+    }
+    update_bounds(object);
+    if (object->object.references) world->geometry_touched = world->list_dirty = true;
+    return ES_OK;
+}
+
+void es_meshes_settle(es_world* world)
+{
+    const es_slots* slots = &world->slots[ES_OBJECT_MESH];
+    for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
+        es_mesh_object* mesh = es_slots_at(slots, slot);
+        if (!mesh || !mesh->moving) continue;
+        mesh->moving = false;
+        mesh->raster.previous_positions = NULL;
+        update_bounds(mesh);
+        world->list_dirty = true;
+    }
+}
+
+void es_mesh_restored(es_mesh_object* mesh)
+{
+    mesh->raster.previous_positions = mesh->moving ? mesh->previous : NULL;
+    update_bounds(mesh);
+}
+
+const es_raster_mesh* es_world_mesh(const es_world* world, es_mesh mesh)
+{
+    es_mesh_object* object = world ? es_world_object(world, ES_OBJECT_MESH, mesh.id) : NULL;
+    return object ? &object->raster : NULL;
+}

@@ -1,0 +1,61 @@
+/* The table of built-in scenes, and opening worlds by name. */
+#include "sim/scenes/scenes.h"
+
+#include <string.h>
+
+#include "platform/settings.h"
+
+static const es_scene scenes[] = {
+    {"cornell", "a Cornell box with four moving objects under a moving spot light (3,372 triangles)", es_scene_cornell},
+    {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
+    {"hall", "a colonnade that a light from the side aisle reaches mostly by way of its walls", es_scene_hall},
+};
+
+size_t es_scene_count(void) { return sizeof scenes / sizeof scenes[0]; }
+const char* es_scene_name(size_t index) { return index < es_scene_count() ? scenes[index].name : NULL; }
+const char* es_scene_description(size_t index) { return index < es_scene_count() ? scenes[index].description : NULL; }
+
+static const es_scene* find(const char* name)
+{
+    for (size_t i = 0; i < es_scene_count(); i++)
+        if (strcmp(scenes[i].name, name) == 0) return &scenes[i];
+    return NULL;
+}
+
+es_result es_world_create_scene(es_context* context, const char* name, const es_world_settings* settings, es_world** world)
+{
+    if (!context || !world) return ES_INVALID_ARGUMENT;
+    *world = NULL;
+    if (!name) return es_misuse(context, ES_INVALID_ARGUMENT, "es_world_create_scene: name must not be NULL");
+    const es_scene* scene = find(name);
+    if (!scene) {
+        es_setting names[sizeof scenes / sizeof scenes[0]] = {0};
+        const es_setting* table = names;
+        size_t count = es_scene_count();
+        for (size_t i = 0; i < count; i++) names[i].name = scenes[i].name;
+        return es_fail(context, ES_SCENE_UNKNOWN, "no built-in scene is named '%.64s'; the nearest is '%s'", name, es_settings_nearest(&table, &count, 1, name));
+    }
+    es_world* w;
+    es_result result = es_world_create(context, settings, &w);
+    if (result != ES_OK) return result;
+    es_fp_environment environment = es_fp_enter();
+    result = scene->build(w, w->settings.triangles);
+    es_fp_leave(environment);
+    if (result == ES_OK) result = es_world_finish_opening(w);
+    if (result != ES_OK) {
+        es_world_destroy(w);
+        return result;
+    }
+    *world = w;
+    return ES_OK;
+}
+
+/* A name with a point or a slash in it is a file's, so a mistyped scene is told from a missing file. */
+es_result es_world_open(es_context* context, const char* scene_or_path, const es_world_settings* settings, es_world** world)
+{
+    if (!context || !world) return ES_INVALID_ARGUMENT;
+    *world = NULL;
+    if (!scene_or_path) return es_misuse(context, ES_INVALID_ARGUMENT, "es_world_open: the scene or path must not be NULL");
+    bool file = !find(scene_or_path) && strpbrk(scene_or_path, "./\\");
+    return file ? es_world_import_gltf(context, scene_or_path, settings, world) : es_world_create_scene(context, scene_or_path, settings, world);
+}

@@ -1,0 +1,18 @@
+/* The built-in scenes: one file each, one table. */
+#ifndef EARTHSHINE_SIM_SCENES_H
+#define EARTHSHINE_SIM_SCENES_H
+
+#include "sim/world.h"
+
+typedef struct es_scene {
+    const char* name;
+    const char* description;
+    /* Fills an empty world; `triangles` is what to aim at, 0 the scene's own number. */
+    es_result (*build)(es_world* world, uint32_t triangles);
+} es_scene;
+
+es_result es_scene_cornell(es_world* world, uint32_t triangles);
+es_result es_scene_room(es_world* world, uint32_t triangles);
+es_result es_scene_hall(es_world* world, uint32_t triangles);
+
+#endif

@@ -1,0 +1,284 @@
+/* Saving, restoring and hashing what moves.
+ *
+ * One function visits every piece of state in slot order; it counts, writes, hashes, checks or applies, so the five can
+ * never disagree about the layout. A saved state carries a signature of the world's content (which objects exist, how
+ * large their meshes are) and a hash of itself: another world's or a damaged buffer is refused before anything is touched. */
+#include "sim/world.h"
+
+#include <string.h>
+
+#include "platform/random.h"
+
+typedef enum state_mode { COUNT, WRITE, HASH, CHECK, APPLY } state_mode;
+typedef struct state_io {
+    state_mode mode;
+    char* bytes;        /* WRITE, CHECK, APPLY */
+    size_t at, size;    /* size: CHECK, APPLY */
+    uint64_t hash;
+    bool good;
+} state_io;
+
+static bool reading(const state_io* io) { return io->mode >= CHECK; }
+
+static void transfer(state_io* io, void* data, size_t size)
+{
+    if (reading(io) && (!io->good || size > io->size - io->at)) {
+        io->good = false;
+        return;
+    }
+    if (io->mode == WRITE) memcpy(io->bytes + io->at, data, size);
+    else if (io->mode == HASH) io->hash = es_hash_bytes(io->hash, data, size);
+    else if (reading(io)) memcpy(data, io->bytes + io->at, size);
+    io->at += size;
+}
+
+static void visit_u32(state_io* io, uint32_t* value) { transfer(io, value, sizeof *value); }
+static void visit_floats(state_io* io, float* values, size_t count) { transfer(io, values, count * sizeof *values); }
+
+static void visit_flag(state_io* io, bool* flag)
+{
+    uint32_t word = *flag;
+    visit_u32(io, &word);
+    if (reading(io)) io->good &= word <= 1;
+    *flag = word == 1;
+}
+
+static void visit_node(es_world* world, state_io* io, es_node_object* node)
+{
+    es_transform transform = node->transform, resolved;
+    es_mat4 previous = node->previous;
+    visit_floats(io, &transform.translation.x, 3);
+    visit_floats(io, &transform.rotation.x, 4);
+    visit_floats(io, &transform.scale.x, 3);
+    visit_floats(io, previous.m, 16);
+    if (!reading(io) || !io->good) return;
+    io->good = es_transform_resolve(&transform, &resolved);
+    if (io->mode != APPLY) return;
+    node->transform = transform;
+    node->previous = previous;
+    node->dirty = world->nodes_dirty = true;
+}
+
+static void visit_instance(es_world* world, state_io* io, es_instance_object* instance)
+{
+    es_instance_desc desc = instance->desc;
+    visit_u32(io, &desc.node.id);
+    visit_u32(io, &desc.mesh.id);
+    visit_u32(io, &desc.material.id);
+    visit_flag(io, &desc.hidden);
+    if (!reading(io) || !io->good) return;
+    io->good = es_slots_get(&world->slots[ES_OBJECT_MESH], desc.mesh.id) && (!desc.node.id || es_slots_get(&world->slots[ES_OBJECT_NODE], desc.node.id)) &&
+               (!desc.material.id || es_slots_get(&world->slots[ES_OBJECT_MATERIAL], desc.material.id));
+    if (io->good && io->mode == APPLY) es_world_set_instance(world, (es_instance){instance->object.id}, &desc);
+}
+
+static void visit_lens(es_world* world, state_io* io, es_camera_desc* desc)
+{
+    es_camera_desc now = *desc, resolved;
+    visit_u32(io, &now.node.id);
+    visit_flag(io, &now.orthographic);
+    visit_floats(io, &now.fov_y, 1);
+    visit_floats(io, &now.half_height, 1);
+    visit_floats(io, &now.near_plane, 1);
+    visit_floats(io, &now.far_plane, 1);
+    if (!reading(io) || !io->good) return;
+    io->good = es_camera_desc_resolve(world, &now, &resolved);
+    if (io->good) *desc = now;
+}
+
+static void visit_camera(es_world* world, state_io* io, es_camera_object* camera)
+{
+    es_camera_desc desc = camera->desc, previous = camera->previous;
+    es_mat4 previous_world = camera->previous_world;
+    visit_lens(world, io, &desc);
+    previous.node = desc.node; /* last frame's node may be gone; its matrix is what counts */
+    visit_lens(world, io, &previous);
+    visit_floats(io, previous_world.m, 16);
+    if (io->mode != APPLY || !io->good) return;
+    es_world_set_camera(world, (es_camera){camera->object.id}, &desc);
+    camera->previous = previous;
+    camera->previous_world = previous_world;
+}
+
+static void visit_light(es_world* world, state_io* io, es_light_object* light)
+{
+    es_light_desc desc = light->desc, resolved;
+    uint32_t type = desc.type;
+    visit_u32(io, &desc.node.id);
+    visit_u32(io, &type);
+    visit_floats(io, desc.color, 3);
+    visit_floats(io, &desc.intensity, 1);
+    visit_floats(io, &desc.inner_cone, 1);
+    visit_floats(io, &desc.outer_cone, 1);
+    visit_floats(io, &desc.range, 1);
+    visit_flag(io, &desc.off);
+    if (!reading(io) || !io->good) return;
+    io->good = type <= ES_LIGHT_DIRECTIONAL;
+    desc.type = (es_light_type)type;
+    io->good = io->good && es_light_desc_resolve(world, &desc, &resolved);
+    if (io->good && io->mode == APPLY) es_world_set_light(world, (es_light){light->object.id}, &desc);
+}
+
+static void visit_stream(state_io* io, float* stream, size_t floats)
+{
+    if (io->mode != CHECK) {
+        visit_floats(io, stream, floats);
+        return;
+    }
+    float four[4];
+    for (size_t i = 0; i < floats && io->good; i += 4) {
+        visit_floats(io, four, 4);
+        io->good &= es_all_within(four, 4, ES_WORLD_EXTENT);
+    }
+}
+
+static void visit_mesh(es_world* world, state_io* io, es_mesh_object* mesh)
+{
+    bool deformed = mesh->deformed, moving = mesh->moving;
+    size_t floats = 4 * (((size_t)mesh->raster.vertex_count + 7) / 8 * 8);
+    if (floats == 0) floats = 32;
+    visit_flag(io, &deformed);
+    visit_flag(io, &moving);
+    if (reading(io) && (!io->good || (moving && !deformed))) {
+        io->good = false;
+        return;
+    }
+    if (reading(io) && deformed && !es_mesh_make_deformable(world, mesh)) {
+        io->good = false;
+        return;
+    }
+    if (io->mode == APPLY && mesh->deformed && !deformed) {
+        memcpy(mesh->positions, mesh->rest, floats * sizeof(float));
+        if (mesh->normals) memcpy(mesh->normals, mesh->rest_normals, floats * sizeof(float));
+    }
+    if (io->mode == APPLY && (mesh->deformed || deformed)) world->geometry_touched = world->list_dirty = true;
+    if (deformed) {
+        visit_stream(io, mesh->positions, floats);
+        if (mesh->normals) visit_stream(io, mesh->normals, floats);
+        if (moving) visit_stream(io, mesh->previous, floats);
+    }
+    if (io->mode != APPLY) return;
+    mesh->deformed = deformed;
+    mesh->moving = moving;
+    es_mesh_restored(mesh);
+}
+
+static void visit_clip(state_io* io, es_clip_object* clip)
+{
+    bool playing = clip->playing;
+    double start = clip->start;
+    visit_flag(io, &playing);
+    transfer(io, &start, sizeof start);
+    if (!reading(io) || !io->good) return;
+    io->good = start >= -1e12 && start <= 1e12;
+    if (io->mode != APPLY) return;
+    clip->playing = playing;
+    clip->start = start;
+}
+
+static void visit_world(es_world* world, state_io* io)
+{
+    double time = world->time;
+    bool stepped = world->stepped;
+    es_camera active = world->active_camera;
+    transfer(io, &time, sizeof time);
+    visit_flag(io, &stepped);
+    visit_u32(io, &active.id);
+    if (reading(io) && io->good) io->good = time >= 0 && time <= 1e12 && (!active.id || es_slots_get(&world->slots[ES_OBJECT_CAMERA], active.id));
+    if (io->mode == APPLY && io->good) {
+        world->time = time;
+        world->stepped = stepped;
+        world->active_camera = active;
+        world->camera_dirty = world->nodes_moving = world->list_dirty = true;
+    }
+    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_MESH};
+    for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++)
+        for (uint32_t slot = 0; slot < world->slots[kinds[k]].slot_count && (io->good || !reading(io)); slot++) {
+            void* object = es_slots_at(&world->slots[kinds[k]], slot);
+            if (!object) continue;
+            switch (kinds[k]) {
+            case ES_OBJECT_NODE: visit_node(world, io, object); break;
+            case ES_OBJECT_INSTANCE: visit_instance(world, io, object); break;
+            case ES_OBJECT_CAMERA: visit_camera(world, io, object); break;
+            case ES_OBJECT_LIGHT: visit_light(world, io, object); break;
+            case ES_OBJECT_CLIP: visit_clip(io, object); break;
+            default: visit_mesh(world, io, object); break;
+            }
+        }
+}
+
+static uint64_t content_signature(const es_world* world)
+{
+    uint64_t hash = 0;
+    for (int kind = 0; kind < ES_OBJECT_KINDS; kind++) {
+        const es_slots* slots = &world->slots[kind];
+        for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
+            const es_object* object = es_slots_at(slots, slot);
+            uint32_t words[3] = {object ? object->id : 0, 0, 0};
+            if (object && kind == ES_OBJECT_MESH) {
+                const es_raster_mesh* mesh = &((const es_mesh_object*)object)->raster;
+                words[1] = mesh->vertex_count;
+                words[2] = mesh->triangle_count;
+            }
+            hash = es_hash_bytes(hash, words, sizeof words);
+        }
+        hash = es_hash_bytes(hash, &kind, sizeof kind);
+    }
+    return hash;
+}
+
+typedef struct state_header { char magic[8]; uint64_t content, payload; } state_header;
+static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '1'};
+
+es_result es_world_save(const es_world* world, void* buffer, size_t* size)
+{
+    if (!world || !size) return ES_INVALID_ARGUMENT;
+    es_world_refresh(world);
+    es_world* w = (es_world*)world; /* nothing is written to it in these modes */
+    state_io io = {.mode = COUNT, .good = true};
+    visit_world(w, &io);
+    size_t needed = sizeof(state_header) + io.at, capacity = *size;
+    *size = needed;
+    if (!buffer) return ES_OK;
+    if (capacity < needed) return es_fail(world->context, ES_INVALID_ARGUMENT, "the world's state takes %zu bytes, room was given for %zu", needed, capacity);
+    io = (state_io){.mode = WRITE, .bytes = (char*)buffer + sizeof(state_header), .good = true};
+    visit_world(w, &io);
+    state_header header = {.content = content_signature(world), .payload = es_hash_bytes(0, io.bytes, io.at)};
+    memcpy(header.magic, magic, sizeof magic);
+    memcpy(buffer, &header, sizeof header);
+    return ES_OK;
+}
+
+es_result es_world_restore(es_world* world, const void* buffer, size_t size)
+{
+    if (!world || !buffer) return ES_INVALID_ARGUMENT;
+    es_context* context = world->context;
+    state_header header;
+    if (size < sizeof header || memcmp(buffer, magic, sizeof magic) != 0) return es_fail(context, ES_FILE_TYPE, "restoring a world: the buffer is not a saved world state");
+    memcpy(&header, buffer, sizeof header);
+    es_world_refresh(world);
+    if (header.content != content_signature(world)) return es_fail(context, ES_WRONG_STATE, "restoring a world: the state was saved from a world with other content");
+    char* payload = (char*)buffer + sizeof header; /* only read */
+    size_t payload_size = size - sizeof header;
+    if (header.payload != es_hash_bytes(0, payload, payload_size)) return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
+    state_io io = {.mode = CHECK, .bytes = payload, .size = payload_size, .good = true};
+    visit_world(world, &io);
+    if (!io.good || io.at != payload_size) {
+        es_result last = es_context_last_result(context);
+        if (last == ES_OUT_OF_MEMORY || last == ES_MEMORY_CAP) return last;
+        return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
+    }
+    io = (state_io){.mode = APPLY, .bytes = payload, .size = payload_size, .good = true};
+    visit_world(world, &io);
+    es_world_refresh(world);
+    return ES_OK;
+}
+
+uint64_t es_world_hash(const es_world* world)
+{
+    if (!world) return 0;
+    es_world_refresh(world);
+    state_io io = {.mode = HASH, .hash = content_signature(world), .good = true};
+    visit_world((es_world*)world, &io);
+    return io.hash;
+}

@@ -1,0 +1,150 @@
+/* Inside of a world, for the files of this floor.
+ *
+ * Setters change objects and raise marks; es_world_refresh turns the marks into what the getters hand out (world matrices,
+ * draw list, lights, the active camera) and counts revisions up where the content really differs. Everything refresh
+ * writes into was sized when objects were added, so it cannot fail and getters may call it. */
+#ifndef EARTHSHINE_SIM_WORLD_H
+#define EARTHSHINE_SIM_WORLD_H
+
+#include "sim/sim.h"
+#include "sim/slots.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* |coordinate|, |scale| and the like at most: squares of differences stay finite in float */
+#define ES_WORLD_EXTENT 1e9f
+
+typedef struct es_texture_object { es_object object; es_texture_image image; } es_texture_object;
+
+typedef struct es_material_object { es_object object; es_material_desc desc; } es_material_object;
+
+typedef struct es_mesh_object {
+    es_object object;
+    es_raster_mesh raster;   /* previous_positions is set only while it differs from positions */
+    float *positions, *previous, *normals, *tangents, *uvs, *colors;
+    float *rest, *rest_normals; /* as added; kept from the first deformation on, for restoring */
+    uint32_t* indices;
+    bool deformed;           /* ever: its vertices are state, not an asset */
+    bool moving;             /* deformed since the step began or at the one before */
+} es_mesh_object;
+
+typedef struct es_node_object {
+    es_object object;
+    es_node parent;
+    es_transform transform;
+    es_mat4 local, world, previous;
+    uint32_t depth;          /* of the root's children: 0 */
+    uint32_t played_by;      /* the clip that took the node when the world was opened */
+    bool dirty;              /* `transform` changed since the last refresh */
+    bool fresh;              /* created since then: has no last frame */
+    bool changed;            /* `world` changed in this refresh */
+} es_node_object;
+
+typedef struct es_instance_object { es_object object; es_instance_desc desc; bool warned; } es_instance_object;
+
+typedef struct es_camera_object {
+    es_object object;
+    es_camera_desc desc;     /* name NULL */
+    es_camera_desc previous;
+    es_mat4 previous_world;
+    bool fresh;
+} es_camera_object;
+
+typedef struct es_light_object { es_object object; es_light_desc desc; } es_light_object;
+
+typedef struct es_clip_object {
+    es_object object;
+    es_clip_channel* channels;
+    uint32_t channel_count;
+    float* data;             /* the channels' times and values, one after another */
+    size_t data_count;
+    float duration;
+    bool playing;
+    double start;            /* world time at which it began to play */
+} es_clip_object;
+
+/* What a camera revision stands for. No padding: compared as bytes. */
+typedef struct es_camera_state { uint32_t id, orthographic; float fov_y, half_height, near_plane, far_plane; es_mat4 world; } es_camera_state;
+
+struct es_world {
+    es_context* context;
+    es_world_settings settings;
+    es_slots slots[ES_OBJECT_KINDS];
+    double time;
+    bool in_step;
+    bool stepped;                  /* before the first step there is no last frame */
+    es_world_step_function step_function;
+    void* step_user;
+    es_camera active_camera;
+
+    uint32_t* order;               /* node slots, parents before children: by depth, then by slot */
+    size_t order_capacity, order_count;
+    bool order_dirty, nodes_dirty, nodes_moving;
+
+    es_raster_instance* drawn;     /* of list */
+    size_t drawn_capacity;
+    es_material_desc* materials;   /* [0] the default material, [slot + 1] the others */
+    size_t material_capacity;
+    es_draw_list list;
+    bool list_dirty;               /* entries or their transforms may differ */
+    bool geometry_touched;         /* an instance or mesh certainly differs */
+    bool instances_moving;
+    bool has_bounds;
+    es_vec3 bounds_min, bounds_max;
+
+    es_light_state* lights;
+    size_t light_capacity, light_count;
+    bool lights_dirty;
+
+    es_camera_state camera_state;
+    bool camera_dirty, camera_moving;
+
+    es_world_revisions revisions;
+};
+
+/* ---- asking about arguments: OK, or a failure with its message ---------------------------------------------------- */
+
+static inline bool es_finite(float x) { return x - x == 0.0f; }
+static inline bool es_within(float x, float low, float high) { return x >= low && x <= high; } /* false for NaN */
+bool es_all_within(const float* values, size_t count, float limit);
+/* The object or NULL after a message. */
+void* es_world_object(const es_world* world, es_object_kind kind, uint32_t id);
+/* Moves one reference from handle `from` to handle `to`; null handles are skipped. */
+void es_world_rereference(es_world* world, es_object_kind kind, uint32_t from, uint32_t to);
+
+/* ---- refreshing ------------------------------------------------------------------------------------------------------- */
+
+void es_world_refresh(const es_world* world);
+void es_nodes_refresh(es_world* world);
+void es_draw_list_refresh(es_world* world);
+void es_lights_refresh(es_world* world);
+void es_camera_refresh(es_world* world);
+/* The present pose becomes the last one. */
+void es_world_settle(es_world* world);
+void es_meshes_settle(es_world* world);
+bool es_draw_list_reserve(es_world* world);
+/* The null handle stands for the world's own axes. */
+const es_mat4* es_node_world(const es_world* world, es_node node);
+const es_mat4* es_node_previous(const es_world* world, es_node node);
+/* The transform with zero-initialised parts replaced and the rotation made unit; false when a number is out of range. */
+bool es_transform_resolve(const es_transform* transform, es_transform* resolved);
+
+void es_clips_play(es_world* world);
+bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
+void es_mesh_restored(es_mesh_object* mesh);  /* after its streams were replaced */
+void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
+bool es_camera_desc_resolve(es_world* world, const es_camera_desc* desc, es_camera_desc* resolved);
+bool es_light_desc_resolve(es_world* world, const es_light_desc* desc, es_light_desc* resolved);
+
+/* Last act of opening a scene or file: chooses camera and clips by the settings, poses the clips at time 0, makes that
+ * pose the last one too. SETTING_VALUE when the settings name a camera or clip that is not there. */
+es_result es_world_finish_opening(es_world* world);
+
+es_result es_world_settings_resolve(es_context* context, const es_world_settings* settings, es_world_settings* resolved);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,36 @@
+/* The world's settings: names, ranges, defaults. */
+#include "sim/world.h"
+
+#include "platform/settings.h"
+
+#define AT(field) offsetof(es_world_settings, field)
+
+static const es_setting world_table[] = {
+    {"world.triangles", ES_SETTING_INT, "0", 0, 20000000, NULL, "triangles a built-in scene aims at; 0: its own number", AT(triangles)},
+    {"world.speed", ES_SETTING_FLOAT, "1", 0, 100, NULL, "seconds of the world per second", AT(speed)},
+    {"world.camera", ES_SETTING_INT, "0", 0, 65535, NULL, "which of the scene's cameras, counted from 0", AT(camera)},
+    {"world.clip", ES_SETTING_INT, "0", 0, 65535, NULL, "which clip plays; 0: all that do not touch the same node", AT(clip)},
+    {"world.default-light", ES_SETTING_BOOL, "true", 0, 1, NULL, "give files without lights one", AT(default_light)},
+};
+
+size_t es_world_setting_count(void) { return sizeof world_table / sizeof world_table[0]; }
+
+const es_setting* es_world_setting(size_t index) { return index < es_world_setting_count() ? &world_table[index] : NULL; }
+
+es_world_settings es_default_world_settings(void)
+{
+    es_world_settings settings = {0};
+    es_settings_defaults(world_table, es_world_setting_count(), &settings);
+    return settings;
+}
+
+es_result es_world_settings_set(es_context* context, es_world_settings* settings, const char* name, const char* value)
+{
+    return es_settings_set(context, world_table, es_world_setting_count(), settings, name, value);
+}
+
+es_result es_world_settings_resolve(es_context* context, const es_world_settings* settings, es_world_settings* resolved)
+{
+    *resolved = settings ? *settings : es_default_world_settings();
+    return es_settings_check(context, world_table, es_world_setting_count(), resolved);
+}
