@@ -183,6 +183,8 @@ void es_context_count_object(es_context* context, int change)
     atomic_fetch_add_explicit(&context->objects, change, memory_order_relaxed);
 }
 
+uint64_t es_context_next_serial(es_context* context) { return atomic_fetch_add_explicit(&context->serials, 1, memory_order_relaxed) + 1; }
+
 /* ---- life -------------------------------------------------------------------------------------------------------------- */
 
 es_context_desc es_default_context_desc(void) { return (es_context_desc){0}; }

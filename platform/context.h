@@ -44,6 +44,9 @@ void es_fp_leave(es_fp_environment environment);
 /* Counts objects created from the context so that leaks are reported at its end: +1 and -1. */
 void es_context_count_object(es_context* context, int change);
 
+/* 1, 2, 3 …: never the same twice on one context. */
+uint64_t es_context_next_serial(es_context* context);
+
 /* ---- arena: memory for one frame or one task, released all at once ------------------------------------------------------- */
 
 typedef struct es_arena_block es_arena_block;

@@ -31,6 +31,7 @@ struct es_context {
     atomic_bool in_loop;
     atomic_size_t bytes, peak_bytes;
     atomic_int objects;
+    atomic_uint_least64_t serials;  /* handed out by es_context_next_serial */
     pthread_mutex_t message_mutex;
     es_result last_result;
     char message[ES_MESSAGE_SIZE];

@@ -206,7 +206,8 @@ typedef struct es_light_state {
 /* Lights that are on and not black, in slot order. */
 ES_API const es_light_state* es_world_lights(const es_world* world, size_t* count);
 
-/* Each number goes up when something of its kind changes; equal numbers mean the same content, bit for bit. */
+/* Each number goes up when something of its kind changes; equal numbers mean the same content, bit for bit,
+ * across all worlds of one context. */
 typedef struct es_world_revisions {
     uint64_t geometry;    /* transforms, meshes, instances */
     uint64_t materials;   /* materials and textures */
