@@ -56,6 +56,7 @@ typedef struct es_renderer_settings {
     /* display */
     uint32_t tone_map;               /* es_tone_map */
     float exposure;                  /* stops */
+    float white;                     /* REINHARD: radiance times exposure that is shown as white */
     uint32_t bounces;                /* 0: none; 1: one indirect bounce */
 } es_renderer_settings;
 

@@ -195,7 +195,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     const es_gbuffer* g = &renderer->gbuffer;
     const es_light_view* light = renderer->light_count ? &renderer->light_views[0] : NULL;
     uint32_t width = g->width, height = g->height, channels = 3;
-    uint32_t shown_maps = es_ism_maps_count(&renderer->maps) < 64 ? es_ism_maps_count(&renderer->maps) : 64;
+    uint32_t shown_maps = renderer->maps.count < 64 ? renderer->maps.count : 64;
     bool of_light = kind == IMAGE_LIGHT_ALBEDO || kind == IMAGE_LIGHT_NORMAL || kind == IMAGE_IMPORTANCE;
     if (kind == IMAGE_SHADOW_MAP && light) {
         width = light->faces[0].shadow_view.width * light->face_count;

@@ -5,7 +5,7 @@
 
 #include "gi/classic.h"
 #include "gi/direct.h"
-#include "gi/kernel_table.h"
+#include "gi/surface.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/settings.h"
@@ -57,6 +57,7 @@ es_result es_renderer_create(es_context* context, const es_renderer_settings* se
     renderer->context = context;
     renderer->settings = resolved;
     es_context_count_object(context, 1);
+    es_arena_init(&renderer->arena, context, 1 << 16);
     result = es_rasterizer_create(context, &renderer->rasterizer);
     if (result) {
         es_renderer_destroy(renderer);
@@ -93,6 +94,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
     es_scene_points_free(context, &renderer->points);
     es_ism_maps_free(context, &renderer->maps);
+    es_arena_free(&renderer->arena);
     if (renderer->rasterizer) es_rasterizer_destroy(renderer->rasterizer);
     es_release(context, renderer, sizeof *renderer);
     es_context_count_object(context, -1);
@@ -169,16 +171,11 @@ typedef struct frame_inputs {
     const char* no_indirect; /* why there is no indirect light; NULL: there is */
 } frame_inputs;
 
-/* Has the surface, textures aside, a lobe whose peak reaches a tenth of a white diffuse surface's? (The rule for virtual point
- * lights too; below it, evaluating the lobe for each of a thousand lights changes less than their sampling error.) */
+/* Textures may make any roughness of it. */
 static bool material_has_lobe(const es_material_desc* m)
 {
-    if (m->model == ES_SURFACE_UNLIT) return false;
-    if (m->model == ES_SURFACE_PHONG) return m->specular > 0.0f;
-    float alpha = m->roughness * m->roughness;
-    if (m->metallic_roughness_texture.image) return true;
-    float f0 = es_maxf(m->metallic, 0.04f * m->specular);
-    return f0 > 0.4f * alpha * alpha;
+    es_surface surface = es_surface_of(m->model, es_v3(1, 1, 1), m->metallic, m->model == ES_SURFACE_PHONG ? m->exponent : m->roughness, m->specular);
+    return es_surface_has_lobe(&surface) || (m->model == ES_SURFACE_METALLIC_ROUGHNESS && m->metallic_roughness_texture.image);
 }
 
 static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
@@ -291,6 +288,22 @@ static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
     return result;
 }
 
+/* A point on the light's own surface must not shadow it: at twice the light G-buffer's texel that is out of reach. */
+static float near_distance(const frame_inputs* in) { return in->extent * 2e-3f; }
+
+static es_result draw_classic_maps(es_renderer* r, const frame_inputs* in)
+{
+    uint32_t size = r->settings.classic_size;
+    size_t scratch_floats = es_classic_scratch_floats(size);
+    float* scratch = es_allocate_array(r->context, scratch_floats, sizeof *scratch);
+    if (!scratch) return es_context_last_result(r->context);
+    es_result result = es_ism_maps_reserve(r->context, &r->maps, size, r->vpl_count, in->extent);
+    for (uint32_t i = 0; i < r->vpl_count && !result; i++)
+        result = es_classic_map_draw(r->rasterizer, in->list, &r->vpls[i], size, near_distance(in), in->extent, scratch, r->maps.texels + (size_t)i * size * size);
+    es_release(r->context, scratch, scratch_floats * sizeof *scratch);
+    return result;
+}
+
 static uint32_t subset_count(const es_renderer_settings* s)
 {
     uint32_t count = s->ism_pool / s->ism_points;
@@ -317,7 +330,7 @@ static es_result pass_maps(es_renderer* r, const frame_inputs* in)
         es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
         es_plan_reads(plan, &s->classic_size, sizeof s->classic_size);
         if (!es_plan_run(plan, ES_PASS_CLASSIC)) return ES_OK;
-        es_result result = es_classic_maps_build(r->context, r->rasterizer, in->list, r->vpls, r->vpl_count, s->classic_size, in->extent, &r->maps);
+        es_result result = draw_classic_maps(r, in);
         if (!result) es_plan_done(plan, ES_PASS_CLASSIC, r->vpl_count);
         return result;
     }
@@ -340,7 +353,8 @@ static es_result pass_maps(es_renderer* r, const frame_inputs* in)
     float numbers[] = {(float)s->ism_size, s->pull_push, s->pull_threshold, s->push_threshold, (float)s->pull_push_levels, in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_ISM)) return ES_OK;
-    es_ism_job job = {0};
+    es_ism_job job = {.vpls = r->vpls, .vpl_count = r->vpl_count, .points = &r->points, .size = s->ism_size, .far_distance = in->extent, .near_distance = near_distance(in),
+        .pull_push = s->pull_push, .pull_threshold = s->pull_threshold, .push_threshold = s->push_threshold, .pull_push_levels = s->pull_push_levels};
     es_result result = es_ism_maps_build(r->context, &r->maps, &job);
     if (!result) es_plan_done(plan, ES_PASS_ISM, (uint64_t)r->vpl_count * s->ism_points);
     return result;
@@ -367,4 +381,183 @@ static es_result pass_direct(es_renderer* r, const frame_inputs* in)
     }
     es_plan_done(plan, ES_PASS_DIRECT, r->light_count);
     return ES_OK;
+}
+
+static es_result pass_shading(es_renderer* r, const frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    if (in->no_indirect || !r->vpl_count) {
+        es_plan_not_needed(plan, ES_PASS_SHADING, in->no_indirect ? in->no_indirect : "the lights reach nothing");
+        return ES_OK;
+    }
+    r->has_specular = frame_has_lobes(r, in->list);
+    es_plan_begin(plan, ES_PASS_SHADING);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_ISM);
+    es_plan_reads_pass(plan, ES_PASS_CLASSIC);
+    float numbers[] = {s->ism_bias, s->geometry_bound, (float)s->interleave, in->extent, r->has_specular};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
+    es_result result = es_planes_resize(r->context, &r->irradiance, &r->gbuffer);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, &r->gbuffer);
+    if (result) return result;
+    es_shade_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
+        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .geometry_bound = s->geometry_bound, .interleave = s->interleave};
+    for (int k = 0; k < 3; k++) {
+        job.irradiance[k] = r->irradiance.at[k];
+        job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;
+    }
+    es_arena_reset(&r->arena);
+    result = es_shade(r->context, &r->arena, &job);
+    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->vpl_count / (s->interleave * s->interleave));
+    return result;
+}
+
+static es_result pass_filter(es_renderer* r, const frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter ? "filter is off" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    r->filtered = why == NULL;
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_FILTER, why);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
+    es_result result = es_planes_resize(r->context, &r->filtered_irradiance, &r->gbuffer);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->filtered_specular, &r->gbuffer);
+    if (result) return result;
+    es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = r->irradiance.at[k];
+        job.result[k] = r->filtered_irradiance.at[k];
+        job.source[k + 3] = r->specular.at[k];
+        job.result[k + 3] = r->filtered_specular.at[k];
+    }
+    es_arena_reset(&r->arena);
+    result = es_filter_geometry_aware(r->context, &r->arena, &job);
+    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+    return result;
+}
+
+es_compose_job es_renderer_compose_job(const es_renderer* r)
+{
+    const es_renderer_settings* s = &r->settings;
+    es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure), .white = s->white, .tone_map = s->tone_map};
+    const es_planes* irradiance = r->filtered ? &r->filtered_irradiance : &r->irradiance;
+    const es_planes* specular = r->filtered ? &r->filtered_specular : &r->specular;
+    for (int k = 0; k < 3; k++) {
+        if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
+        if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];
+        if (r->plan.valid[ES_PASS_SHADING] && r->has_specular) job.specular[k] = specular->at[k];
+    }
+    return job;
+}
+
+static void pass_compose(es_renderer* r)
+{
+    es_plan* plan = &r->plan;
+    es_compose_job job = es_renderer_compose_job(r);
+    es_plan_begin(plan, ES_PASS_COMPOSE);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_DIRECT);
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_plan_reads_pass(plan, ES_PASS_FILTER);
+    float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_COMPOSE)) return;
+    job.xrgb = r->display;
+    es_compose(r->context, &job);
+    es_plan_done(plan, ES_PASS_COMPOSE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+}
+
+/* ---- the frame ------------------------------------------------------------------------------------------------------------------ */
+
+static es_result render(es_renderer* r, es_world* world)
+{
+    es_camera camera = es_world_active_camera(world);
+    if (!camera.id) return es_misuse(r->context, ES_WRONG_STATE, "the world has no active camera; es_world_set_active_camera chooses one");
+    es_result result = resize_frame(r);
+    if (result) return result;
+    result = es_world_camera_view(world, camera, r->settings.width, r->settings.height, &r->view);
+    if (result) return result;
+    r->rays = es_pixel_rays_of_view(&r->view);
+
+    frame_inputs in = {.list = es_world_draw_list(world), .revisions = es_world_get_revisions(world)};
+    size_t light_count;
+    in.lights = es_world_lights(world, &light_count);
+    in.light_count = (uint32_t)light_count;
+    in.has_geometry = es_world_bounds(world, &in.bounds_min, &in.bounds_max);
+    in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-6f) : 1.0f;
+    const es_renderer_settings* s = &r->settings;
+    in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
+
+    es_plan_begin_frame(&r->plan, s->skip);
+    result = pass_visibility(r, &in);
+    if (!result) result = pass_light_views(r, &in);
+    if (!result) result = pass_vpls(r, &in);
+    if (!result) result = pass_maps(r, &in);
+    if (!result) result = pass_direct(r, &in);
+    if (!result) result = pass_shading(r, &in);
+    if (!result) result = pass_filter(r, &in);
+    if (!result) pass_compose(r);
+    return result;
+}
+
+es_result es_renderer_render(es_renderer* renderer, es_world* world)
+{
+    if (!world || es_world_context(world) != renderer->context) return es_misuse(renderer->context, ES_INVALID_ARGUMENT, "the renderer and the world must share one context");
+    double start = es_seconds();
+    es_fp_environment environment = es_fp_enter();
+    es_result result = render(renderer, world);
+    es_fp_leave(environment);
+    if (result) {
+        es_plan_invalidate(&renderer->plan); /* a pass may have stopped halfway */
+        return result;
+    }
+    renderer->stats.frame = renderer->frames++;
+    renderer->stats.milliseconds = (es_seconds() - start) * 1e3;
+    renderer->stats.passes = renderer->plan.stats;
+    renderer->stats.pass_count = ES_PASS_COUNT;
+    return ES_OK;
+}
+
+/* ---- results ------------------------------------------------------------------------------------------------------------------------ */
+
+const uint32_t* es_renderer_display(es_renderer* renderer, uint32_t* width, uint32_t* height)
+{
+    *width = renderer->gbuffer.width;
+    *height = renderer->gbuffer.height;
+    return renderer->display;
+}
+
+const es_frame_stats* es_renderer_stats(const es_renderer* renderer) { return &renderer->stats; }
+
+size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t capacity)
+{
+    for (size_t i = 0; i < renderer->vpl_count && i < capacity; i++) {
+        const es_vpl_record* v = &renderer->vpls[i];
+        vpls[i] = (es_vpl){{v->position[0], v->position[1], v->position[2]}, {v->normal[0], v->normal[1], v->normal[2]}, {v->flux[0], v->flux[1], v->flux[2]}};
+    }
+    return renderer->vpl_count;
+}
+
+size_t es_renderer_points(const es_renderer* renderer, uint32_t map, float* positions, size_t capacity)
+{
+    const es_scene_points* points = &renderer->points;
+    if (!points->subset_count) return 0;
+    size_t first = (size_t)(map % points->subset_count) * points->subset_size;
+    for (size_t i = 0; i < points->subset_size && i < capacity; i++) {
+        positions[3 * i] = points->x[first + i];
+        positions[3 * i + 1] = points->y[first + i];
+        positions[3 * i + 2] = points->z[first + i];
+    }
+    return points->subset_size;
 }

@@ -10,6 +10,7 @@
 #include "gi/scene_points.h"
 #include "gi/shade.h"
 #include "gi/vpl_sampling.h"
+#include "platform/context.h"
 
 /* Three planes of floats, rows of the G-buffer's stride. */
 typedef struct es_planes { float* at[3]; void* memory; size_t bytes; } es_planes;
@@ -39,7 +40,8 @@ struct es_renderer {
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;
     es_planes specular, filtered_specular; /* used when something in the frame has a lobe */
-    bool has_specular;
+    bool has_specular, filtered;
+    es_arena arena;            /* of the pass that runs */
     uint32_t* display;         /* 0x00RRGGBB */
 };
 

@@ -38,6 +38,7 @@ static const es_setting renderer_table[] = {
     {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
 
     {"tone-map", ES_SETTING_CHOICE, "reinhard", 0, 0, "reinhard|pbr-neutral|linear", "display transform", AT(tone_map)},
+    {"white", ES_SETTING_FLOAT, "4", 0.01, 100000, NULL, "Reinhard: radiance times exposure that is shown as white", AT(white)},
     {"exposure", ES_SETTING_FLOAT, "0", -20, 20, NULL, "stops", AT(exposure)},
 };
 

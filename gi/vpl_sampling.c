@@ -3,30 +3,12 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
+#include "gi/surface.h"
 #include "raster/pack.h"
 
 static float luminance(es_vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
-typedef struct texel_surface {
-    es_vec3 base_color;
-    float metallic, roughness, specular;
-    uint32_t model;
-} texel_surface;
-
-static texel_surface surface_at(const es_gbuffer* gbuffer, size_t at)
-{
-    uint32_t rg = gbuffer->albedo_rg[at], b = gbuffer->albedo_b[at], s = gbuffer->surface[at];
-    const float unit = 1.0f / 65535.0f, byte = 1.0f / 255.0f;
-    texel_surface t = {
-        .base_color = es_v3((float)(rg & 0xffff) * unit, (float)(rg >> 16) * unit, (float)(b & 0xffff) * unit),
-        .metallic = (float)(s & 0xff) * byte,
-        .roughness = (float)(s >> 8 & 0xff) * byte,
-        .specular = (float)(s >> 16 & 0xff) * byte,
-        .model = s >> 24,
-    };
-    if (t.model == ES_SURFACE_PHONG) t.roughness = (float)(s >> 8 & 0xff) * 0.2f; /* the exponent */
-    return t;
-}
+static es_surface surface_at(const es_gbuffer* gbuffer, size_t at) { return es_surface_of_gbuffer(gbuffer->albedo_rg[at], gbuffer->albedo_b[at], gbuffer->surface[at]); }
 
 /* Power that a face's texel receives per unit of the light's intensity: solid angle (perspective, sr) or area (orthographic, m²),
  * times the falloff. A perspective texel at tangent coordinates (a, b) spans step² / (1 + a² + b²)^(3/2). */
@@ -59,11 +41,12 @@ static void importance_rows(void* user, uint32_t begin, uint32_t end, uint32_t w
             size_t at = (size_t)y * face->gbuffer.stride + x;
             float depth = face->gbuffer.depth[at], value = 0.0f;
             if (depth > 0.0f) {
-                texel_surface surface = surface_at(&face->gbuffer, at);
+                es_surface surface = surface_at(&face->gbuffer, at);
                 if (surface.model != ES_SURFACE_UNLIT) {
-                    /* eq. 4.3, SP taken as 1 - roughness (GGX) or exponent / 50 (Phong): 0 diffuse … 1 mirror-like */
-                    float power = surface.model == ES_SURFACE_PHONG ? surface.roughness * 0.02f * surface.specular : (1.0f - surface.roughness) * es_maxf(surface.metallic, surface.specular * 0.04f);
-                    value = texel_share(job->view, face, x, y, depth) * luminance(es_v3_mul(surface.base_color, light)) * (0.5f + power);
+                    /* eq. 4.3; SP runs from 0 (diffuse) to 1 (mirror-like): the exponent / 50, or 1 - roughness, by the lobe's weight */
+                    float gloss = (surface.model == ES_SURFACE_PHONG ? surface.roughness * 0.02f : 1.0f - surface.roughness) * luminance(surface.specular);
+                    float reflected = luminance(es_v3_mul(es_v3_add(surface.albedo, surface.specular), light));
+                    value = texel_share(job->view, face, x, y, depth) * reflected * (0.5f + gloss);
                 }
             }
             out[x] = value;
@@ -161,14 +144,6 @@ bool es_importance_warp(const es_importance* importance, float u, float v, uint3
     return *probability > 0.0f;
 }
 
-/* A lobe is worth evaluating when its peak, F0 / (4 α²) for GGX, is a tenth of a white diffuse surface's or more. */
-static bool has_lobe(const texel_surface* surface, es_vec3 f0)
-{
-    if (surface->model == ES_SURFACE_PHONG) return surface->specular > 0.0f;
-    float alpha = surface->roughness * surface->roughness;
-    return luminance(f0) > 0.1f * 4.0f * alpha * alpha;
-}
-
 static void make_record(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float weight, bool glossy, es_vpl_record* record)
 {
     const es_gbuffer* gbuffer = &face->gbuffer;
@@ -178,19 +153,10 @@ static void make_record(const es_light_view* view, const es_light_face* face, ui
     es_vec3 normal = es_unpack_normal(gbuffer->normal[at]), tangent, bitangent;
     es_orthonormal_basis(normal, &tangent, &bitangent);
     es_vec3 incident = view->orthographic ? es_v3_scale(view->light.direction, -1.0f) : es_v3_normalize(es_v3_sub(view->light.position, position), normal);
-    texel_surface surface = surface_at(gbuffer, at);
+    es_surface surface = surface_at(gbuffer, at);
     float share = texel_share(view, face, x, y, depth) * weight;
     es_vec3 power = es_v3_scale(es_v3(view->light.radiant[0], view->light.radiant[1], view->light.radiant[2]), share);
-    es_vec3 f0, diffuse;
-    if (surface.model == ES_SURFACE_PHONG) {
-        f0 = es_v3(surface.specular, surface.specular, surface.specular);
-        diffuse = surface.base_color;
-    } else {
-        float dielectric = 0.04f * surface.specular * (1.0f - surface.metallic);
-        f0 = es_v3_add(es_v3_scale(surface.base_color, surface.metallic), es_v3(dielectric, dielectric, dielectric));
-        diffuse = es_v3_scale(surface.base_color, 1.0f - surface.metallic);
-    }
-    es_vec3 flux = es_v3_mul(power, diffuse);
+    es_vec3 flux = es_v3_mul(power, surface.albedo);
     *record = (es_vpl_record){
         .position = {position.x, position.y, position.z},
         .normal = {normal.x, normal.y, normal.z},
@@ -199,10 +165,10 @@ static void make_record(const es_light_view* view, const es_light_face* face, ui
         .flux = {flux.x, flux.y, flux.z},
         .power = {power.x, power.y, power.z},
         .incident = {incident.x, incident.y, incident.z},
-        .specular_color = {f0.x, f0.y, f0.z},
+        .specular_color = {surface.specular.x, surface.specular.y, surface.specular.z},
         .roughness = surface.roughness,
         .model = surface.model,
-        .glossy = glossy && has_lobe(&surface, f0),
+        .glossy = glossy && es_surface_has_lobe(&surface),
     };
 }
 
@@ -272,7 +238,10 @@ es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32
         }
         es_vpl_record* record = &records[subset + in_subset++ * request->subsets];
         /* the sequence's first point is the origin itself: start at 1 */
-        es_importance_warp(&importances[chosen], es_halton(0, index + 1), es_halton(1, index + 1), &face, &x, &y, &probability);
+        if (!es_importance_warp(&importances[chosen], es_halton(0, index + 1), es_halton(1, index + 1), &face, &x, &y, &probability)) {
+            *record = (es_vpl_record){.normal = {0, 1, 0}, .tangent = {0, 0, 1}, .bitangent = {1, 0, 0}, .incident = {0, 1, 0}, .roughness = 1.0f};
+            continue; /* underflowed importance: a light that sends nothing */
+        }
         make_record(&views[chosen], &views[chosen].faces[face], x, y, 1.0f / (probability * (float)shares[chosen]), request->glossy, record);
     }
     *count = drawn;

@@ -156,8 +156,7 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                             vz = dz * inverse;
                         }
                         vf fr, fg, fb;
-                        vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at);
-                        es_surface_reflect_gbuffer_v(rg, b, surface_word, nx, ny, nz, lx, ly, lz, vx, vy, vz, &fr, &fg, &fb);
+                        es_surface_reflect_gbuffer_v(vi_load(g->albedo_rg + at), vi_load(g->albedo_b + at), surface_word, nx, ny, nz, lx, ly, lz, vx, vy, vz, &fr, &fg, &fb);
                         /* irradiance of the light times the model; cos is in the irradiance */
                         vf e = strength * vf_max(cosine, zero);
                         out_r = vf_and(lanes, e * vf_set1(light->radiant[0]) * fr);
