@@ -28,7 +28,11 @@ double bench_median(double* values, size_t count)
     return count % 2 ? values[count / 2] : (values[count / 2 - 1] + values[count / 2]) / 2;
 }
 
-typedef struct benchmark { const char* name; int (*run)(const bench_options*); bool by_default; } benchmark;
+typedef struct benchmark {
+    const char* name;
+    int (*run)(const bench_options*);
+    bool by_default;
+} benchmark;
 static const benchmark benchmarks[] = {{"speed", bench_speed, true}, {"frame", bench_frame, false}};
 enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0] };
 
@@ -52,7 +56,8 @@ static int check_row_id(const char* id)
 
 static int prepare_directory(const char* path)
 {
-    if (mkdir(path, 0777) != 0 && errno != EEXIST) return demo_refuse("--out %s: no such directory, and none can be made: %s", path, strerror(errno));
+    if (mkdir(path, 0777) != 0 && errno != EEXIST)
+        return demo_refuse("--out %s: no such directory, and none can be made: %s", path, strerror(errno));
     char probe[DEMO_PATH_SIZE];
     snprintf(probe, sizeof probe, "%s/speed.json", path);
     return demo_check_writable(probe);
@@ -85,7 +90,8 @@ int demo_bench(int count, char** arguments)
         for (size_t k = 0; k < 4; k++) is_known |= !strcmp(argument, known[k]);
         if (!is_known) {
             const char* nearest = demo_nearest(argument, known, 5);
-            return demo_refuse("bench: unknown option %s; %s", argument, nearest ? nearest : "--out, --runs, --threads, --only and --no-peer are known");
+            return demo_refuse("bench: unknown option %s; %s", argument,
+                nearest ? nearest : "--out, --runs, --threads, --only and --no-peer are known");
         }
         if (++i == count) return demo_refuse("%s: a value must follow", argument);
         if (!strcmp(argument, "--out"))

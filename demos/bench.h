@@ -5,30 +5,30 @@
 #include "demo.h"
 
 typedef enum bench_judge {
-    BENCH_NONE,             /* a figure without a target */
-    BENCH_RATIO_AT_LEAST,   /* `ratio` against the targets */
-    BENCH_VALUE_AT_MOST     /* `value` against the targets */
+    BENCH_NONE,           /* a figure without a target */
+    BENCH_RATIO_AT_LEAST, /* `ratio` against the targets */
+    BENCH_VALUE_AT_MOST   /* `value` against the targets */
 } bench_judge;
 
 typedef struct bench_row {
     const char* id;
-    const char* work;       /* what was done, for people */
-    const char* unit;       /* of value and peer_value */
-    const char* peer;       /* NULL: measured against nothing */
+    const char* work; /* what was done, for people */
+    const char* unit; /* of value and peer_value */
+    const char* peer; /* NULL: measured against nothing */
     bench_judge judge;
     double must, aim;
     double value, peer_value, ratio; /* NaN: not measured; ratio: how many times better than the peer */
-    char note[200];         /* why a figure is missing, or what stands behind it */
+    char note[200];                  /* why a figure is missing, or what stands behind it */
 } bench_row;
 
 typedef struct bench_options {
-    const char* out;                /* directory; NULL: none */
+    const char* out; /* directory; NULL: none */
     uint32_t runs;
     uint32_t threads;
     bool no_peer;
-    const char* only[32];           /* row ids; none: all */
+    const char* only[32]; /* row ids; none: all */
     size_t only_count;
-    const char* program;            /* path of this program, for the rows that start it */
+    const char* program; /* path of this program, for the rows that start it */
 } bench_options;
 
 bool bench_wants(const bench_options* options, const char* id);
@@ -47,17 +47,27 @@ const char* bench_verdict(const bench_row* row); /* "aim", "must", "missed", "" 
 void bench_add_svg(demo_text* text, const bench_row* rows, size_t count);
 
 /* bench_child.c */
-typedef struct bench_child { int status; double seconds; double peak_mebibytes; char* output; size_t size; } bench_child;
-/* Runs a program with its standard output captured and one environment variable set (NULL: none). status 0 is success, -1: it could not be
- * started. The caller frees output. */
+typedef struct bench_child {
+    int status;
+    double seconds;
+    double peak_mebibytes;
+    char* output;
+    size_t size;
+} bench_child;
+/* Runs a program with its standard output captured and one environment variable set (NULL: none). status 0 is success, -1: it
+ * could not be started. The caller frees output. */
 bench_child bench_run_child(const char* const* arguments, const char* variable, const char* value, bool quiet);
 
 /* bench_peer.c: llvmpipe's program from the folder of peers, built into a temporary folder */
 typedef struct bench_peer {
-    char folder[DEMO_PATH_SIZE];       /* of the peers' sources; "" when there are none */
-    char build[DEMO_PATH_SIZE];        /* temporary; "" when nothing is built */
-    char why[200];                     /* why there is no peer */
-    struct { char name[96]; double values[64]; size_t count; } rows[64];
+    char folder[DEMO_PATH_SIZE]; /* of the peers' sources; "" when there are none */
+    char build[DEMO_PATH_SIZE];  /* temporary; "" when nothing is built */
+    char why[200];               /* why there is no peer */
+    struct {
+        char name[96];
+        double values[64];
+        size_t count;
+    } rows[64];
     size_t row_count;
 } bench_peer;
 /* False with `why` when the peers are absent or cannot be built. */

@@ -101,7 +101,8 @@ void bench_measure_errors(const bench_options* options, const bench_peer* peer, 
         es_image_destroy(context, &indirect);
     }
     if (bench_wants(options, "direct-room")) {
-        es_image direct = room_image(context, peer, ES_GI_NONE, "direct"), reference = reference_image(context, peer, "room_direct_reference.exr");
+        es_image direct = room_image(context, peer, ES_GI_NONE, "direct"),
+                 reference = reference_image(context, peer, "room_direct_reference.exr");
         bench_row* row = bench_find_row(rows, count, "direct-room");
         double share = 0;
         uint8_t* mask = reference.pixels && reference.channels >= 3 ? shadow_edge_mask(&reference, &share) : NULL;

@@ -34,7 +34,8 @@ bool bench_peer_open(bench_peer* peer, bool build)
 {
     *peer = (bench_peer){0};
     const char* shared = getenv("EARTHSHINE_SHARED");
-    if (!(shared && shared[0] ? try_folder(peer, shared) : try_folder(peer, DEMO_SOURCE_DIR "/../shared") || try_folder(peer, "../shared"))) {
+    if (!(shared && shared[0] ? try_folder(peer, shared)
+                              : try_folder(peer, DEMO_SOURCE_DIR "/../shared") || try_folder(peer, "../shared"))) {
         snprintf(peer->why, sizeof peer->why, "no peers: neither EARTHSHINE_SHARED nor ../shared holds peers/llvmpipe");
         return false;
     }
@@ -50,13 +51,15 @@ bool bench_peer_open(bench_peer* peer, bool build)
         compile(peer, DEMO_SOURCE_DIR "/demos/bench_start_peer.c", "start_peer");
         return true;
     }
-    snprintf(peer->why, sizeof peer->why, "llvmpipe's program could not be built; `demos/install-packages bench` installs what it needs");
+    snprintf(peer->why, sizeof peer->why,
+        "llvmpipe's program could not be built; `demos/install-packages bench` installs what it needs");
     return false;
 }
 
 static void add_value(bench_peer* peer, const char* name, double value)
 {
-    size_t i = 0, most_rows = sizeof peer->rows / sizeof peer->rows[0], most_values = sizeof peer->rows[0].values / sizeof peer->rows[0].values[0];
+    size_t i = 0, most_rows = sizeof peer->rows / sizeof peer->rows[0],
+           most_values = sizeof peer->rows[0].values / sizeof peer->rows[0].values[0];
     while (i < peer->row_count && strcmp(peer->rows[i].name, name) != 0) i++;
     if (i == peer->row_count) {
         if (i == most_rows) return;

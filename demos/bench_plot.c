@@ -11,7 +11,10 @@ static double score(const bench_row* row)
     return NAN;
 }
 
-static double aim_score(const bench_row* row) { return row->judge == BENCH_RATIO_AT_LEAST ? row->aim / row->must : row->must / row->aim; }
+static double aim_score(const bench_row* row)
+{
+    return row->judge == BENCH_RATIO_AT_LEAST ? row->aim / row->must : row->must / row->aim;
+}
 
 enum { LEFT = 150, WIDTH = 760, ROW = 26, TOP = 40, RIGHT = 90 };
 static const double lowest = 0.1, highest = 20;
@@ -28,12 +31,19 @@ void bench_add_svg(demo_text* text, const bench_row* rows, size_t count)
     size_t shown = 0;
     for (size_t i = 0; i < count; i++) shown += rows[i].judge != BENCH_NONE;
     double bottom = TOP + (double)shown * ROW;
-    demo_text_add(text, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %g\" font-family=\"system-ui,sans-serif\" font-size=\"12\">\n", WIDTH, bottom + 12);
-    demo_text_add(text, "<text x=\"%d\" y=\"14\" fill=\"#333\">times better than the must (dashed: 1); tick: the aim</text>\n", LEFT);
+    demo_text_add(text,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %g\" font-family=\"system-ui,sans-serif\" "
+        "font-size=\"12\">\n",
+        WIDTH, bottom + 12);
+    demo_text_add(
+        text, "<text x=\"%d\" y=\"14\" fill=\"#333\">times better than the must (dashed: 1); tick: the aim</text>\n", LEFT);
     for (size_t i = 0; i < sizeof ticks / sizeof ticks[0]; i++) {
         double x = position(ticks[i]);
-        demo_text_add(text, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%g\" stroke=\"%s\"%s/><text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\" fill=\"#777\">%g</text>\n", x, x,
-            TOP - 4, bottom, ticks[i] == 1 ? "#333" : "#e3e3e3", ticks[i] == 1 ? " stroke-dasharray=\"4 3\"" : "", x, TOP - 8, ticks[i]);
+        demo_text_add(text,
+            "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%g\" stroke=\"%s\"%s/><text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\" "
+            "fill=\"#777\">%g</text>\n",
+            x, x, TOP - 4, bottom, ticks[i] == 1 ? "#333" : "#e3e3e3", ticks[i] == 1 ? " stroke-dasharray=\"4 3\"" : "", x,
+            TOP - 8, ticks[i]);
     }
     size_t k = 0;
     for (size_t i = 0; i < count; i++) {
@@ -53,8 +63,10 @@ void bench_add_svg(demo_text* text, const bench_row* rows, size_t count)
             snprintf(figure, sizeof figure, "%.3gx", row->ratio);
         else
             snprintf(figure, sizeof figure, "%.3g %s", row->value, row->unit);
-        demo_text_add(text, "<rect x=\"%d\" y=\"%.1f\" width=\"%.1f\" height=\"%d\" fill=\"%s\"/>", LEFT, y + 4, fmax(x - LEFT, 1), ROW - 8, colour);
-        demo_text_add(text, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#111\" stroke-width=\"2\"/>", a, a, y + 2, y + ROW - 2);
+        demo_text_add(text, "<rect x=\"%d\" y=\"%.1f\" width=\"%.1f\" height=\"%d\" fill=\"%s\"/>", LEFT, y + 4,
+            fmax(x - LEFT, 1), ROW - 8, colour);
+        demo_text_add(text, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#111\" stroke-width=\"2\"/>", a, a,
+            y + 2, y + ROW - 2);
         demo_text_add(text, "<text x=\"%.1f\" y=\"%.1f\" fill=\"#333\">%s</text>\n", fmax(x, a) + 6, y + 17, figure);
     }
     demo_text_add(text, "</svg>\n");

@@ -25,7 +25,8 @@ static void number(char text[32], double value, const char* suffix)
 
 void bench_print(const bench_row* rows, size_t count)
 {
-    printf("%-16s %10s %-8s %10s %8s %8s %8s  %-7s %s\n", "row", "value", "unit", "peer", "ratio", "must", "aim", "reached", "peer's name, notes");
+    printf("%-16s %10s %-8s %10s %8s %8s %8s  %-7s %s\n", "row", "value", "unit", "peer", "ratio", "must", "aim", "reached",
+        "peer's name, notes");
     for (size_t i = 0; i < count; i++) {
         const bench_row* row = &rows[i];
         char value[32], peer[32], ratio[32], must[32] = "-", aim[32] = "-";
@@ -37,8 +38,8 @@ void bench_print(const bench_row* rows, size_t count)
             number(must, row->must, suffix);
             number(aim, row->aim, suffix);
         }
-        printf("%-16s %10s %-8s %10s %8s %8s %8s  %-7s %s%s%s\n", row->id, value, row->unit, peer, ratio, must, aim, bench_verdict(row),
-            row->peer ? row->peer : "", row->peer && row->note[0] ? "; " : "", row->note);
+        printf("%-16s %10s %-8s %10s %8s %8s %8s  %-7s %s%s%s\n", row->id, value, row->unit, peer, ratio, must, aim,
+            bench_verdict(row), row->peer ? row->peer : "", row->peer && row->note[0] ? "; " : "", row->note);
     }
     fflush(stdout);
 }
@@ -106,9 +107,12 @@ static void add_html(demo_text* text, const char* name, const bench_row* rows, s
 {
     demo_text_add(text,
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Earthshine: bench %s</title>\n"
-        "<style>body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:66em;padding:0 1em;color:#222}table{border-collapse:collapse;width:100%%}"
-        "th,td{text-align:left;padding:.3em .6em;border-bottom:1px solid #ddd}td.n{text-align:right;font-variant-numeric:tabular-nums}"
-        ".aim{color:#07703a}.must{color:#8a6100}.missed{color:#b3261e}pre{white-space:pre-wrap;color:#555}svg{width:100%%;height:auto}</style>\n"
+        "<style>body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:66em;padding:0 "
+        "1em;color:#222}table{border-collapse:collapse;width:100%%}"
+        "th,td{text-align:left;padding:.3em .6em;border-bottom:1px solid "
+        "#ddd}td.n{text-align:right;font-variant-numeric:tabular-nums}"
+        ".aim{color:#07703a}.must{color:#8a6100}.missed{color:#b3261e}pre{white-space:pre-wrap;color:#555}svg{width:100%%;height:"
+        "auto}</style>\n"
         "<h1>bench %s</h1>\n",
         name, name);
     bench_add_svg(text, rows, count);
@@ -125,9 +129,10 @@ static void add_html(demo_text* text, const char* name, const bench_row* rows, s
             number(aim, row->aim, suffix);
         }
         demo_text_add(text,
-            "<tr><td>%s<td>%s%s%s<td class=n>%s %s<td class=n title=\"%s\">%s<td class=n>%s<td class=n>%s<td class=n>%s<td class=\"%s\">%s</tr>\n", row->id,
-            row->work, row->note[0] ? "<br><small>" : "", row->note, value, row->unit, row->peer ? row->peer : "", peer, ratio, must, aim,
-            bench_verdict(row), bench_verdict(row));
+            "<tr><td>%s<td>%s%s%s<td class=n>%s %s<td class=n title=\"%s\">%s<td class=n>%s<td class=n>%s<td class=n>%s<td "
+            "class=\"%s\">%s</tr>\n",
+            row->id, row->work, row->note[0] ? "<br><small>" : "", row->note, value, row->unit, row->peer ? row->peer : "", peer,
+            ratio, must, aim, bench_verdict(row), bench_verdict(row));
     }
     demo_text_add(text, "</table>\n<pre>");
     demo_text_add_machine(text, context);

@@ -43,9 +43,16 @@ static es_context* make_context(uint32_t threads)
     return es_context_create(&desc, &context) == ES_OK ? context : NULL;
 }
 
-/* ---- drawing alone -------------------------------------------------------------------------------------------------------------- */
+/* ---- drawing alone
+ * -------------------------------------------------------------------------------------------------------------- */
 
-typedef struct drawing { es_context* context; es_world* world; es_rasterizer* rasterizer; es_gbuffer gbuffer; float* depth; } drawing;
+typedef struct drawing {
+    es_context* context;
+    es_world* world;
+    es_rasterizer* rasterizer;
+    es_gbuffer gbuffer;
+    float* depth;
+} drawing;
 
 static bool drawing_open(drawing* d, uint32_t threads, uint32_t triangles)
 {
@@ -54,8 +61,8 @@ static bool drawing_open(drawing* d, uint32_t threads, uint32_t triangles)
     es_world_settings settings = es_default_world_settings();
     settings.triangles = triangles;
     d->depth = aligned_alloc(64, 1024 * 1024 * sizeof(float));
-    return d->depth && es_world_create_scene(d->context, "room", &settings, &d->world) == ES_OK && es_world_step(d->world, 0) == ES_OK &&
-           es_rasterizer_create(d->context, &d->rasterizer) == ES_OK &&
+    return d->depth && es_world_create_scene(d->context, "room", &settings, &d->world) == ES_OK &&
+           es_world_step(d->world, 0) == ES_OK && es_rasterizer_create(d->context, &d->rasterizer) == ES_OK &&
            es_gbuffer_create(d->context, WIDTH, HEIGHT, ES_GBUFFER_ALL, &d->gbuffer) == ES_OK;
 }
 
@@ -101,12 +108,22 @@ static double time_drawing(drawing* d, const es_raster_view* view, bool depth_on
     return bench_median(times, REPETITIONS);
 }
 
-/* ---- whole frames ---------------------------------------------------------------------------------------------------------------- */
+/* ---- whole frames
+ * ---------------------------------------------------------------------------------------------------------------- */
 
 enum { MAX_PASSES = 32 };
-typedef struct frame_times { double total; size_t passes; const char* names[MAX_PASSES]; double milliseconds[MAX_PASSES]; } frame_times;
+typedef struct frame_times {
+    double total;
+    size_t passes;
+    const char* names[MAX_PASSES];
+    double milliseconds[MAX_PASSES];
+} frame_times;
 
-typedef struct lit_frame { es_context* context; es_world* world; es_renderer* renderer; } lit_frame;
+typedef struct lit_frame {
+    es_context* context;
+    es_world* world;
+    es_renderer* renderer;
+} lit_frame;
 
 static bool lit_frame_open(lit_frame* f, uint32_t threads)
 {
@@ -187,7 +204,8 @@ int bench_frame(const bench_options* options)
     return code;
 }
 
-/* ---- rows that start programs ------------------------------------------------------------------------------------------------------- */
+/* ---- rows that start programs
+ * ------------------------------------------------------------------------------------------------------- */
 
 /* Milliseconds of the whole frame in a fresh process of `program`; NaN when it fails. */
 static double frame_in_process(const char* program, uint32_t threads)
@@ -214,19 +232,23 @@ static bench_child render_in_process(const bench_options* options, const char* s
 {
     char thread_text[16];
     snprintf(thread_text, sizeof thread_text, "%u", options->threads);
-    const char* arguments[] = {options->program, "render", scene, "--size", "1024x768", "--threads", thread_text, "--set", "vpl.count=1024", "--set",
-        "ism.size=128", "--hash", NULL};
+    const char* arguments[] = {options->program, "render", scene, "--size", "1024x768", "--threads", thread_text, "--set",
+        "vpl.count=1024", "--set", "ism.size=128", "--hash", NULL};
     bench_child child = bench_run_child(arguments, NULL, NULL, true);
     free(child.output);
     child.output = NULL;
     return child;
 }
 
-/* ---- all of it -------------------------------------------------------------------------------------------------------------------------- */
+/* ---- all of it
+ * -------------------------------------------------------------------------------------------------------------------------- */
 
 /* What the rounds gather: a list of values per figure. */
 enum { GBUFFER_70K, GBUFFER_1M, DEPTH_1M, ISM, SHADE, FILTER, FRAME, FRAME_ONE_THREAD, EXACT, INEXACT, MEMORY, START, FIGURES };
-typedef struct gathered { double values[FIGURES][MAX_ROUNDS]; size_t counts[FIGURES]; } gathered;
+typedef struct gathered {
+    double values[FIGURES][MAX_ROUNDS];
+    size_t counts[FIGURES];
+} gathered;
 
 static void gather(gathered* g, int figure, double value)
 {
@@ -300,7 +322,8 @@ static void fill(bench_row* rows, size_t count, const char* id, double value, do
 static void fill_rows(gathered* g, bench_peer* peer, bench_row* rows, size_t count)
 {
     double gbuffer = bench_peer_value(peer, "gbuf 4RT 70k"), splat = bench_peer_value(peer, "ISM splat 8.4M points size 1..4");
-    double shade = bench_peer_value(peer, "VPL shade split N=1024"), box = bench_peer_value(peer, "box filter separable 8+8 split");
+    double shade = bench_peer_value(peer, "VPL shade split N=1024"),
+           box = bench_peer_value(peer, "box filter separable 8+8 split");
     double shadow = bench_peer_value(peer, "shadow map 1024^2 70k");
     fill(rows, count, "gbuffer-70k", median_of(g, GBUFFER_70K), gbuffer);
     fill(rows, count, "gbuffer-1m", median_of(g, GBUFFER_1M), bench_peer_value(peer, "gbuf 4RT 1M"));
@@ -314,7 +337,8 @@ static void fill_rows(gathered* g, bench_peer* peer, bench_row* rows, size_t cou
     bench_row* row = bench_find_row(rows, count, "threads-2");
     row->ratio = row->value = median_of(g, FRAME_ONE_THREAD) / median_of(g, FRAME);
     row->peer_value = isnan(row->ratio) ? NAN : 1;
-    if (!isnan(row->ratio)) snprintf(row->note, sizeof row->note, "%.4g ms against %.4g ms", median_of(g, FRAME), median_of(g, FRAME_ONE_THREAD));
+    if (!isnan(row->ratio))
+        snprintf(row->note, sizeof row->note, "%.4g ms against %.4g ms", median_of(g, FRAME), median_of(g, FRAME_ONE_THREAD));
 
     row = bench_find_row(rows, count, "exact-cost");
     double exact = median_of(g, EXACT), inexact = median_of(g, INEXACT);
@@ -324,7 +348,8 @@ static void fill_rows(gathered* g, bench_peer* peer, bench_row* rows, size_t cou
     if (!isnan(row->ratio))
         snprintf(row->note, sizeof row->note, "%.4g ms against %.4g ms", exact, inexact);
     else
-        snprintf(row->note, sizeof row->note, "no earthshine-inexact beside the program: configure with -DEARTHSHINE_INEXACT_TWIN=ON");
+        snprintf(
+            row->note, sizeof row->note, "no earthshine-inexact beside the program: configure with -DEARTHSHINE_INEXACT_TWIN=ON");
 
     row = bench_find_row(rows, count, "memory-1024");
     row->value = median_of(g, MEMORY);
@@ -334,11 +359,13 @@ int bench_speed(const bench_options* options)
 {
     bench_row all[64], rows[64];
     size_t all_count = bench_speed_rows(all, 64), count = 0;
-    static const char* const without_peer[] = {"indirect-room", "ism-vs-classic", "direct-room", "threads-2", "exact-cost", "memory-1024"};
+    static const char* const without_peer[] = {
+        "indirect-room", "ism-vs-classic", "direct-room", "threads-2", "exact-cost", "memory-1024"};
     bool peer_wanted = options->only_count == 0;
     for (size_t i = 0; i < options->only_count; i++) {
         bool alone = false;
-        for (size_t k = 0; k < sizeof without_peer / sizeof without_peer[0]; k++) alone |= !strcmp(without_peer[k], options->only[i]);
+        for (size_t k = 0; k < sizeof without_peer / sizeof without_peer[0]; k++)
+            alone |= !strcmp(without_peer[k], options->only[i]);
         peer_wanted |= !alone;
     }
     es_context* context = make_context(options->threads);

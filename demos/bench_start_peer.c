@@ -1,7 +1,7 @@
 /* How long llvmpipe takes from nothing to one frame with the passes of ours: context, shaders, shadow map, G-buffer, 1024
- * imperfect shadow maps of 8192 points, interleaved shading of 1024 lights, separable filter, for a scene of about 4,000 triangles.
- * Built and run by `earthshine bench speed`, with the folder of the peer's program on the include path; what is measured
- * leaves out making the scene, starting the process and ending it, which ours includes. */
+ * imperfect shadow maps of 8192 points, interleaved shading of 1024 lights, separable filter, for a scene of about 4,000
+ * triangles. Built and run by `earthshine bench speed`, with the folder of the peer's program on the include path; what is
+ * measured leaves out making the scene, starting the process and ending it, which ours includes. */
 #define main peer_main
 #include "gl_peer.c"
 #undef main
@@ -26,14 +26,16 @@ int main(void)
         float across[3] = {n[2], 0, -n[0]}, flat[3] = {0, -n[2], n[1]}, *t = fabsf(n[0]) > 0.5f ? across : flat;
         float length = 1 / sqrtf(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
         memset(light, 0, 64);
-        for (int k = 0; k < 3; k++) light[k] = v->p[k] + 0.01f * n[k], light[4 + k] = n[k], light[8 + k] = t[k] * length, light[12 + k] = v->c[k] * 0.1f;
+        for (int k = 0; k < 3; k++)
+            light[k] = v->p[k] + 0.01f * n[k], light[4 + k] = n[k], light[8 + k] = t[k] * length, light[12 + k] = v->c[k] * 0.1f;
     }
 
     double start = now_s();
     EGLDisplay display = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, 0);
     eglInitialize(display, 0, 0);
     eglBindAPI(EGL_OPENGL_API);
-    EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, 0, attributes);
     if (!context || !eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) return 1;
     if (!strstr((const char*)glGetString(GL_RENDERER), "llvmpipe")) return 1;
@@ -50,9 +52,11 @@ int main(void)
     glGenVertexArrays(1, &empty);
     GLuint draw = program("#define NRT 4\n#define OUTN vec2\n", VS_G, FS_G), depth_only = program("", VS_D, "void main(){}\n");
     GLuint splat = program("#define SIZED 1\n", VS_SPLAT, "void main(){}\n"), shade = program("#define SPLIT 1\n", VS_FS, FS_VPL);
-    GLuint filter_x = program("#define SPLIT 1\n#define AXIS 0\n", VS_FS, FS_BOX), filter_y = program("#define SPLIT 1\n#define AXIS 1\n", VS_FS, FS_BOX);
+    GLuint filter_x = program("#define SPLIT 1\n#define AXIS 0\n", VS_FS, FS_BOX),
+           filter_y = program("#define SPLIT 1\n#define AXIS 1\n", VS_FS, FS_BOX);
     GLuint targets[4] = {tex(GL_RGBA8, W, H), tex(GL_RG16F, W, H), tex(GL_R32F, W, H), tex(GL_RG16F, W, H)};
-    GLuint gbuffer = fbo(4, targets, tex(GL_DEPTH_COMPONENT32F, W, H)), shadow = fbo(0, 0, tex(GL_DEPTH_COMPONENT32F, 1024, 1024));
+    GLuint gbuffer = fbo(4, targets, tex(GL_DEPTH_COMPONENT32F, W, H)),
+           shadow = fbo(0, 0, tex(GL_DEPTH_COMPONENT32F, 1024, 1024));
     GLuint atlas = tex(GL_DEPTH_COMPONENT32F, ATLAS, ATLAS), maps = fbo(0, 0, atlas);
     GLuint shaded = tex(GL_RGBA16F, W, H), half = tex(GL_RGBA16F, W, H), result = tex(GL_RGBA16F, W, H);
     GLuint to_shaded = fbo(1, &shaded, 0), to_half = fbo(1, &half, 0), to_result = fbo(1, &result, 0);

@@ -18,7 +18,8 @@ static void heat_colour(float t, float rgb[3])
 
 /* |A - B| per pixel (the largest over the channels), on a scale from none to four times the RMSE: single outliers would
  * leave a picture scaled to the maximum black. */
-static int write_difference(es_context* context, const es_image* a, const es_image* b, const demo_channels* channels, double rmse, const char* path)
+static int write_difference(
+    es_context* context, const es_image* a, const es_image* b, const demo_channels* channels, double rmse, const char* path)
 {
     es_image difference = {0};
     if (es_image_create(context, a->width, a->height, 3, &difference) != ES_OK) return demo_refuse_context(context);
@@ -39,7 +40,10 @@ static int write_difference(es_context* context, const es_image* a, const es_ima
     return code;
 }
 
-typedef struct comparison { const char *a, *b, *diff; double limits[METRICS]; } comparison;
+typedef struct comparison {
+    const char *a, *b, *diff;
+    double limits[METRICS];
+} comparison;
 
 static int parse(int count, char** arguments, comparison* what)
 {
@@ -55,7 +59,8 @@ static int parse(int count, char** arguments, comparison* what)
         if (!strncmp(argument, "--max-", 6))
             for (metric = 0; metric < METRICS && strcmp(argument + 6, metric_names[metric]) != 0;) metric++;
         if (metric == METRICS && strcmp(argument, "--diff") != 0)
-            return demo_refuse("compare: unknown option %s; --diff, --max-rmse, --max-relrmse, --max-relmse and --max-max are known", argument);
+            return demo_refuse(
+                "compare: unknown option %s; --diff, --max-rmse, --max-relrmse, --max-relmse and --max-max are known", argument);
         if (++i == count) return demo_refuse("%s: a value must follow", argument);
         if (metric == METRICS)
             what->diff = arguments[i];
@@ -63,7 +68,8 @@ static int parse(int count, char** arguments, comparison* what)
             return demo_refuse("%s %s: a number from 0 is expected", argument, arguments[i]);
     }
     if (!what->b) return demo_refuse("compare: two images are expected: the one in question, then the reference");
-    if (what->diff && !demo_has_image_ending(what->diff)) return demo_refuse("--diff %s: the name must end in .exr, .png or .hdr", what->diff);
+    if (what->diff && !demo_has_image_ending(what->diff))
+        return demo_refuse("--diff %s: the name must end in .exr, .png or .hdr", what->diff);
     if (what->diff && demo_check_writable(what->diff) != DEMO_OK) return DEMO_BAD_INPUT;
     return DEMO_OK;
 }
@@ -72,9 +78,11 @@ static int compare(es_context* context, const comparison* what, const es_image* 
 {
     demo_channels channels;
     if (a->width != b->width || a->height != b->height)
-        return demo_refuse("compare: %s is %ux%u, %s is %ux%u; equal sizes are expected", what->a, a->width, a->height, what->b, b->width, b->height);
+        return demo_refuse("compare: %s is %ux%u, %s is %ux%u; equal sizes are expected", what->a, a->width, a->height, what->b,
+            b->width, b->height);
     if (!demo_match_channels(a, b, &channels))
-        return demo_refuse("compare: %s has %u channels, %s has %u, and no name is shared", what->a, a->channels, what->b, b->channels);
+        return demo_refuse(
+            "compare: %s has %u channels, %s has %u, and no name is shared", what->a, a->channels, what->b, b->channels);
     demo_metrics m = demo_measure(a, b, &channels, NULL);
     double values[METRICS] = {m.rmse, m.relrmse, m.relmse, m.max};
     int code = DEMO_OK;

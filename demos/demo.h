@@ -8,7 +8,7 @@
 /* Exit codes of every command. */
 enum { DEMO_OK = 0, DEMO_EXCEEDED = 1, DEMO_BAD_INPUT = 2 };
 
-/* ---- messages (messages.c): one line on stderr, results alone go to stdout ---------------------------------------------------- */
+/* ---- messages (messages.c): one line on stderr, results alone go to stdout --------------------------------------- */
 
 /* Prints "earthshine: …" and returns DEMO_BAD_INPUT. */
 int demo_refuse(const char* format, ...) ES_PRINTF(1, 2);
@@ -19,24 +19,25 @@ es_logger demo_logger(void);
 /* The candidate with the least edit distance to `name`, NULL when none is near. */
 const char* demo_nearest(const char* name, const char* const* candidates, size_t count);
 
-/* ---- options (options.c) ----------------------------------------------------------------------------------------------------------- */
+/* ---- options (options.c)
+ * ----------------------------------------------------------------------------------------------------------- */
 
 enum { DEMO_MAX_SETS = 64, DEMO_MAX_IMAGES = 32, DEMO_MAX_FRAMES = 1000000 };
 
 typedef struct demo_options {
-    const char* scene;                      /* built-in name or file; NULL when not given */
-    const char* out;                        /* pattern; NULL */
+    const char* scene; /* built-in name or file; NULL when not given */
+    const char* out;   /* pattern; NULL */
     const char* images[DEMO_MAX_IMAGES];
     size_t image_count;
     uint32_t width, height;
     bool size_given, frames_given;
-    uint32_t first, end;                    /* frames [first, end) */
+    uint32_t first, end; /* frames [first, end) */
     double fps;
-    uint32_t threads;                       /* 0: all */
-    uint32_t isa_mask;                      /* 0: best */
+    uint32_t threads;  /* 0: all */
+    uint32_t isa_mask; /* 0: best */
     bool no_skip, hash;
-    int method;                             /* es_gi_method; -1: the setting's default */
-    const char* sets[DEMO_MAX_SETS];        /* key=value */
+    int method;                      /* es_gi_method; -1: the setting's default */
+    const char* sets[DEMO_MAX_SETS]; /* key=value */
     size_t set_count;
     const char* stats;
 } demo_options;
@@ -48,17 +49,20 @@ bool demo_parse_uint(const char* text, uint32_t minimum, uint32_t maximum, uint3
 bool demo_parse_double(const char* text, double minimum, double maximum, double* value);
 const char* demo_method_name(uint32_t method);
 
-/* ---- settings (settings.c) ------------------------------------------------------------------------------------------------------------ */
+/* ---- settings (settings.c)
+ * ------------------------------------------------------------------------------------------------------------ */
 
 /* Applies --size, --gi, --no-skip and every --set to the two structs. */
-int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer);
+int demo_apply_settings(
+    es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer);
 int demo_settings(int count, char** arguments);
 int demo_scenes(int count, char** arguments);
 int demo_images(int count, char** arguments);
 /* Index of an image's name; -1 after a line that suggests the nearest. */
 int demo_find_image(const char* name);
 
-/* ---- a world and its renderer, opened as the options say (session.c) ---------------------------------------------------------------------- */
+/* ---- a world and its renderer, opened as the options say (session.c)
+ * ---------------------------------------------------------------------- */
 
 typedef struct demo_session {
     es_context* context;
@@ -72,7 +76,8 @@ void demo_session_close(demo_session* session);
 /* Brings the world to frame `frame`, which lies at frame / fps seconds: the first call begins at 0. */
 int demo_session_step(demo_session* session, uint32_t frame, double fps);
 
-/* ---- output (output.c) ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- output (output.c)
+ * ----------------------------------------------------------------------------------------------------------------------- */
 
 enum { DEMO_PATH_SIZE = 4096 };
 
@@ -88,22 +93,30 @@ es_image_save_desc demo_save_desc(void);
 /* Writes text to a temporary name and renames it: never a half-written file. */
 int demo_write_text(const char* path, const char* text, size_t size);
 
-/* ---- text that grows (text.c) -------------------------------------------------------------------------------------------------------------------- */
+/* ---- text that grows (text.c)
+ * -------------------------------------------------------------------------------------------------------------------- */
 
-typedef struct demo_text { char* bytes; size_t size, capacity; bool failed; } demo_text;
+typedef struct demo_text {
+    char* bytes;
+    size_t size, capacity;
+    bool failed;
+} demo_text;
 void demo_text_add(demo_text* text, const char* format, ...) ES_PRINTF(2, 3);
 /* With the quotation marks and JSON's escapes. */
 void demo_text_add_json_string(demo_text* text, const char* string);
 void demo_text_free(demo_text* text);
 
-/* ---- machine (machine.c) --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- machine (machine.c)
+ * --------------------------------------------------------------------------------------------------------------------------- */
 
 /* {"processor":…,"isa":…,"threads":…,"compiler":…,"commit":…,"flags":…,"version":…} */
 void demo_text_add_machine(demo_text* text, const es_context* context);
 void demo_processor_name(char* name, size_t size);
 double demo_seconds(void);
 
-/* ---- commands ----------------------------------------------------------------------------------------------------------------------------------------- */
+/* ---- commands
+ * -----------------------------------------------------------------------------------------------------------------------------------------
+ */
 
 int demo_render(int count, char** arguments);
 int demo_play(int count, char** arguments);

@@ -22,8 +22,10 @@ static es_result build(es_world* world)
 {
     float corners[24];
     for (int i = 0; i < 24; i++) corners[i] = (i / 3 >> i % 3 & 1) - 0.5f; /* corner k: bits of k are x, y, z */
-    static const uint32_t faces[36] = {0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
-    es_mesh_desc mesh_desc = {.name = "box", .vertex_count = 8, .triangle_count = 12, .positions = corners, .indices = faces, .flat_normals = true};
+    static const uint32_t faces[36] = {
+        0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6};
+    es_mesh_desc mesh_desc = {
+        .name = "box", .vertex_count = 8, .triangle_count = 12, .positions = corners, .indices = faces, .flat_normals = true};
     es_mesh mesh;
     es_result result = es_world_add_mesh(world, &mesh_desc, &mesh);
     if (result == ES_OK) result = add_box(world, mesh, (es_vec3){0, -0.5f, 0}, (es_vec3){6, 1, 6}, 0.8f, 0.8f, 0.8f);

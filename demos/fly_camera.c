@@ -32,7 +32,8 @@ static void take_over(fly_camera* fly, es_world* world)
 {
     es_camera_desc camera;
     es_mat4 pose;
-    if (es_world_get_camera(world, fly->scenes, &camera) == ES_OK && es_world_get_node_matrix(world, camera.node, &pose) == ES_OK) {
+    if (es_world_get_camera(world, fly->scenes, &camera) == ES_OK &&
+        es_world_get_node_matrix(world, camera.node, &pose) == ES_OK) {
         fly->position = (es_vec3){pose.m[12], pose.m[13], pose.m[14]};
         fly->yaw = atan2f(pose.m[8], pose.m[10]);
         fly->pitch = atan2f(-pose.m[9], hypotf(pose.m[8], pose.m[10]));
@@ -40,12 +41,16 @@ static void take_over(fly_camera* fly, es_world* world)
     fly->flying = true;
 }
 
-static float held(const es_window_input* input, int forward, int backward) { return (float)input->down[forward] - (float)input->down[backward]; }
+static float held(const es_window_input* input, int forward, int backward)
+{
+    return (float)input->down[forward] - (float)input->down[backward];
+}
 
 int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* input, float seconds)
 {
     float ahead = held(input, 'W', 'S'), right = held(input, 'D', 'A'), up = held(input, 'E', 'Q');
-    float turn = held(input, ES_KEY_LEFT, ES_KEY_RIGHT) * 1.5f * seconds, tilt = held(input, ES_KEY_UP, ES_KEY_DOWN) * 1.5f * seconds;
+    float turn = held(input, ES_KEY_LEFT, ES_KEY_RIGHT) * 1.5f * seconds,
+          tilt = held(input, ES_KEY_UP, ES_KEY_DOWN) * 1.5f * seconds;
     if (input->mouse_down[0] || input->mouse_down[1]) {
         turn -= input->mouse_dx * 0.005f;
         tilt -= input->mouse_dy * 0.005f;

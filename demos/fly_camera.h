@@ -5,11 +5,11 @@
 #include "demo.h"
 
 typedef struct fly_camera {
-    es_camera own, scenes;     /* ours, and the one the scene came with */
+    es_camera own, scenes; /* ours, and the one the scene came with */
     es_node node;
     es_vec3 position;
-    float yaw, pitch;          /* radians; yaw 0 looks along -z, positive to the left */
-    float speed;               /* metres per second */
+    float yaw, pitch; /* radians; yaw 0 looks along -z, positive to the left */
+    float speed;      /* metres per second */
     bool flying;
 } fly_camera;
 

@@ -3,7 +3,10 @@
 
 #include <string.h>
 
-typedef struct glyph { char character; char rows[42]; } glyph; /* seven rows of five, a blank between */
+typedef struct glyph {
+    char character;
+    char rows[42];
+} glyph; /* seven rows of five, a blank between */
 
 static const glyph glyphs[] = {
     {'A', ".###. #...# #...# ##### #...# #...# #...#"},
@@ -126,5 +129,6 @@ void demo_draw_dot(demo_canvas* canvas, int x0, int y0, int size, uint32_t colou
 {
     for (int y = y0; y < y0 + size; y++)
         for (int x = x0; x < x0 + size; x++)
-            if (x >= 0 && y >= 0 && x < (int)canvas->width && y < (int)canvas->height) canvas->pixels[(size_t)y * canvas->width + (size_t)x] = colour;
+            if (x >= 0 && y >= 0 && x < (int)canvas->width && y < (int)canvas->height)
+                canvas->pixels[(size_t)y * canvas->width + (size_t)x] = colour;
 }

@@ -25,11 +25,19 @@ static const char usage[] =
     "  earthshine help | --version\n"
     "play takes render's options too; with --frames or --out it needs no window.\n";
 
-typedef struct command { const char* name; int (*run)(int count, char** arguments); } command;
+typedef struct command {
+    const char* name;
+    int (*run)(int count, char** arguments);
+} command;
 
 static const command commands[] = {
-    {"scenes", demo_scenes}, {"play", demo_play}, {"render", demo_render}, {"settings", demo_settings},
-    {"images", demo_images}, {"compare", demo_compare}, {"bench", demo_bench},
+    {"scenes", demo_scenes},
+    {"play", demo_play},
+    {"render", demo_render},
+    {"settings", demo_settings},
+    {"images", demo_images},
+    {"compare", demo_compare},
+    {"bench", demo_bench},
 };
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
@@ -62,5 +70,6 @@ int main(int count, char** arguments)
     const char* names[COMMAND_COUNT];
     for (int i = 0; i < COMMAND_COUNT; i++) names[i] = commands[i].name;
     const char* nearest = demo_nearest(name, names, COMMAND_COUNT);
-    return demo_refuse("unknown command %s; %s%s", name, nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "");
+    return demo_refuse(
+        "unknown command %s; %s%s", name, nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "");
 }

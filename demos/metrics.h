@@ -10,10 +10,15 @@
  *   relmse   mean(d² / (B² + 0.01)): per pixel, as the field's papers use it (Rousselle et al. 2011, ε = 10^-2)
  *   max      largest |d|
  * Sums are in double. A pair that is not finite counts as infinite error unless both are the same infinity or both NaN. */
-typedef struct demo_metrics { double rmse, relrmse, relmse, max, mean; uint64_t samples; } demo_metrics;
+typedef struct demo_metrics {
+    double rmse, relrmse, relmse, max, mean;
+    uint64_t samples;
+} demo_metrics;
 
 /* Which channels of the two images belong together. */
-typedef struct demo_channels { uint32_t count, a[ES_IMAGE_MAX_CHANNELS], b[ES_IMAGE_MAX_CHANNELS]; } demo_channels;
+typedef struct demo_channels {
+    uint32_t count, a[ES_IMAGE_MAX_CHANNELS], b[ES_IMAGE_MAX_CHANNELS];
+} demo_channels;
 
 /* Channels of the same name that both have; alpha only when there is nothing else; by position when no name is shared and
  * the counts are equal. False when neither works. */

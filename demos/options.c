@@ -93,20 +93,29 @@ static const char* const option_names[OPTION_COUNT] = {
 static int apply_option(enum option_id id, const char* value, demo_options* options)
 {
     switch (id) {
-    case OUT: options->out = value; return DEMO_OK;
-    case SIZE: return parse_size(value, options);
-    case FRAMES: return parse_frames(value, options);
+    case OUT:
+        options->out = value;
+        return DEMO_OK;
+    case SIZE:
+        return parse_size(value, options);
+    case FRAMES:
+        return parse_frames(value, options);
     case FPS:
         if (demo_parse_double(value, 0.1, 10000, &options->fps)) return DEMO_OK;
         return demo_refuse("--fps %s: a number from 0.1 to 10000 is expected", value);
     case THREADS:
         if (demo_parse_uint(value, 1, 64, &options->threads)) return DEMO_OK;
         return demo_refuse("--threads %s: a number from 1 to 64 is expected", value);
-    case ISA: return parse_isa(value, options);
-    case NO_SKIP: options->no_skip = true; return DEMO_OK;
-    case GI: return parse_method(value, options);
+    case ISA:
+        return parse_isa(value, options);
+    case NO_SKIP:
+        options->no_skip = true;
+        return DEMO_OK;
+    case GI:
+        return parse_method(value, options);
     case SET:
-        if (!strchr(value, '=')) return demo_refuse("--set %s: key=value is expected; `earthshine settings` lists the keys", value);
+        if (!strchr(value, '='))
+            return demo_refuse("--set %s: key=value is expected; `earthshine settings` lists the keys", value);
         if (options->set_count == DEMO_MAX_SETS) return demo_refuse("--set %s: at most %d settings", value, DEMO_MAX_SETS);
         options->sets[options->set_count++] = value;
         return DEMO_OK;
@@ -115,9 +124,14 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
         if (options->image_count == DEMO_MAX_IMAGES) return demo_refuse("--image %s: at most %d images", value, DEMO_MAX_IMAGES);
         options->images[options->image_count++] = value;
         return DEMO_OK;
-    case HASH: options->hash = true; return DEMO_OK;
-    case STATS: options->stats = value; return DEMO_OK;
-    case OPTION_COUNT: break;
+    case HASH:
+        options->hash = true;
+        return DEMO_OK;
+    case STATS:
+        options->stats = value;
+        return DEMO_OK;
+    case OPTION_COUNT:
+        break;
     }
     return DEMO_BAD_INPUT;
 }
@@ -130,7 +144,8 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
         const char* argument = arguments[i];
         if (only_names || argument[0] != '-' || !argument[1]) {
             if (!argument[0]) return demo_refuse("%s: the scene's name is empty", command);
-            if (options->scene) return demo_refuse("%s: one scene or file is expected, there are two: %s, %s", command, options->scene, argument);
+            if (options->scene)
+                return demo_refuse("%s: one scene or file is expected, there are two: %s, %s", command, options->scene, argument);
             options->scene = argument;
             continue;
         }
@@ -141,11 +156,12 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
         const char* equals = strchr(argument, '=');
         size_t length = equals ? (size_t)(equals - argument) : strlen(argument);
         int id = 0;
-        while (id < OPTION_COUNT && (strlen(option_names[id]) != length || strncmp(option_names[id], argument, length) != 0)) id++;
+        while (id < OPTION_COUNT && (strlen(option_names[id]) != length || strncmp(option_names[id], argument, length) != 0))
+            id++;
         if (id == OPTION_COUNT) {
             const char* nearest = demo_nearest(argument, option_names, OPTION_COUNT);
-            return demo_refuse("%s: unknown option %s; %s%s", command, argument, nearest ? "did you mean " : "`earthshine help` lists all",
-                nearest ? nearest : "");
+            return demo_refuse("%s: unknown option %s; %s%s", command, argument,
+                nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "");
         }
         bool takes_value = id != NO_SKIP && id != HASH;
         if (!takes_value && equals) return demo_refuse("%s: takes no value", option_names[id]);

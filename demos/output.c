@@ -36,7 +36,9 @@ int demo_check_pattern(const char* pattern, uint32_t frames)
         }
         size_t length = conversion_length(c);
         if (!length)
-            return demo_refuse("--out %s: after %% only d or 0Nd (N from 1 to 9) may stand for the frame's number, %%%% for a percent sign", pattern);
+            return demo_refuse(
+                "--out %s: after %% only d or 0Nd (N from 1 to 9) may stand for the frame's number, %%%% for a percent sign",
+                pattern);
         numbers++;
         c += length - 1;
     }
@@ -66,7 +68,8 @@ int demo_check_writable(const char* path)
 {
     struct stat status;
     if (!path[0]) return demo_refuse("an output file's name is empty");
-    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) return demo_refuse("%s: exists and is not a file; name a file", path);
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode))
+        return demo_refuse("%s: exists and is not a file; name a file", path);
     char directory[DEMO_PATH_SIZE], probe[DEMO_PATH_SIZE + 64];
     snprintf(directory, sizeof directory, "%s", path);
     char* slash = strrchr(directory, '/');
@@ -79,7 +82,8 @@ int demo_check_writable(const char* path)
         snprintf(directory, sizeof directory, ".");
     if (stat(directory, &status) != 0) return demo_refuse("%s: there is no directory %s", path, directory);
     if (!S_ISDIR(status.st_mode)) return demo_refuse("%s: %s is not a directory", path, directory);
-    if (access(path, F_OK) == 0 && access(path, W_OK) != 0) return demo_refuse("%s: cannot be written: %s", path, strerror(errno));
+    if (access(path, F_OK) == 0 && access(path, W_OK) != 0)
+        return demo_refuse("%s: cannot be written: %s", path, strerror(errno));
     /* access() says yes to root on much that cannot be written, so a file is tried. */
     snprintf(probe, sizeof probe, "%s/.earthshine-%ld", directory, (long)getpid());
     int file = open(probe, O_CREAT | O_EXCL | O_WRONLY, 0600);

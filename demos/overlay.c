@@ -7,17 +7,21 @@
 
 static es_vec4 transform(const es_mat4* m, es_vec4 v)
 {
-    return (es_vec4){m->m[0] * v.x + m->m[4] * v.y + m->m[8] * v.z + m->m[12] * v.w, m->m[1] * v.x + m->m[5] * v.y + m->m[9] * v.z + m->m[13] * v.w,
-        m->m[2] * v.x + m->m[6] * v.y + m->m[10] * v.z + m->m[14] * v.w, m->m[3] * v.x + m->m[7] * v.y + m->m[11] * v.z + m->m[15] * v.w};
+    return (es_vec4){m->m[0] * v.x + m->m[4] * v.y + m->m[8] * v.z + m->m[12] * v.w,
+        m->m[1] * v.x + m->m[5] * v.y + m->m[9] * v.z + m->m[13] * v.w,
+        m->m[2] * v.x + m->m[6] * v.y + m->m[10] * v.z + m->m[14] * v.w,
+        m->m[3] * v.x + m->m[7] * v.y + m->m[11] * v.z + m->m[15] * v.w};
 }
 
 /* Pixel of a world position; false behind the eye, outside the picture, or behind what is seen there. */
-static bool project(const demo_canvas* canvas, const es_raster_view* view, const es_image* depth, es_vec3 position, int* x, int* y)
+static bool project(
+    const demo_canvas* canvas, const es_raster_view* view, const es_image* depth, es_vec3 position, int* x, int* y)
 {
     es_vec4 eye = transform(&view->view, (es_vec4){position.x, position.y, position.z, 1});
     es_vec4 clip = transform(&view->projection, eye);
     if (!(clip.w > 1e-6f)) return false;
-    float px = (clip.x / clip.w * 0.5f + 0.5f) * (float)canvas->width, py = (0.5f - clip.y / clip.w * 0.5f) * (float)canvas->height;
+    float px = (clip.x / clip.w * 0.5f + 0.5f) * (float)canvas->width,
+          py = (0.5f - clip.y / clip.w * 0.5f) * (float)canvas->height;
     if (!(px >= 0 && py >= 0 && px < (float)canvas->width && py < (float)canvas->height)) return false;
     *x = (int)px;
     *y = (int)py;
@@ -74,7 +78,8 @@ void demo_draw_timings(demo_canvas* canvas, const es_renderer* renderer, double 
     const es_frame_stats* stats = es_renderer_stats(renderer);
     int scale = text_scale(canvas), y = 4 * scale;
     char line[128];
-    snprintf(line, sizeof line, "%-22s %7.2f ms %5.1f /s", "frame", stats->milliseconds, frame_milliseconds > 0 ? 1000 / frame_milliseconds : 0);
+    snprintf(line, sizeof line, "%-22s %7.2f ms %5.1f /s", "frame", stats->milliseconds,
+        frame_milliseconds > 0 ? 1000 / frame_milliseconds : 0);
     demo_draw_text(canvas, 4 * scale, y, scale, 0xffffff, line);
     for (size_t i = 0; i < stats->pass_count; i++) {
         const es_pass_stats* pass = &stats->passes[i];
@@ -90,10 +95,17 @@ void demo_draw_timings(demo_canvas* canvas, const es_renderer* renderer, double 
 void demo_draw_help(demo_canvas* canvas)
 {
     static const char* const lines[] = {
-        "W A S D  Q E   fly, down, up (Shift: faster)", "drag           look around (arrow keys too)", "R              back to the scene's camera",
-        "Space  N       pause, single step", "L              light: all, direct, indirect", "I  1 ... 9     next image, image by number",
-        "G              method: none, ism, classic", "+  -           exposure", "V  P           show virtual lights, shadow points",
-        "T  H           milliseconds per pass, this help", "Esc            quit",
+        "W A S D  Q E   fly, down, up (Shift: faster)",
+        "drag           look around (arrow keys too)",
+        "R              back to the scene's camera",
+        "Space  N       pause, single step",
+        "L              light: all, direct, indirect",
+        "I  1 ... 9     next image, image by number",
+        "G              method: none, ism, classic",
+        "+  -           exposure",
+        "V  P           show virtual lights, shadow points",
+        "T  H           milliseconds per pass, this help",
+        "Esc            quit",
     };
     int scale = text_scale(canvas), count = (int)(sizeof lines / sizeof lines[0]);
     for (int i = 0; i < count; i++) {

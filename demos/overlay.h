@@ -4,7 +4,10 @@
 
 #include "demo.h"
 
-typedef struct demo_canvas { uint32_t* pixels; uint32_t width, height; } demo_canvas;
+typedef struct demo_canvas {
+    uint32_t* pixels;
+    uint32_t width, height;
+} demo_canvas;
 
 /* font.c: white-space is left out, the ground under the text is darkened; (x, y) is the top left of the first letter. */
 void demo_draw_text(demo_canvas* canvas, int x, int y, int scale, uint32_t colour, const char* text);
@@ -12,7 +15,8 @@ void demo_draw_dot(demo_canvas* canvas, int x, int y, int size, uint32_t colour)
 
 /* overlay.c */
 void demo_draw_vpls(demo_canvas* canvas, es_renderer* renderer, const es_raster_view* view, const es_image* depth);
-void demo_draw_points(demo_canvas* canvas, es_renderer* renderer, const es_raster_view* view, const es_image* depth, uint32_t map);
+void demo_draw_points(
+    demo_canvas* canvas, es_renderer* renderer, const es_raster_view* view, const es_image* depth, uint32_t map);
 void demo_draw_timings(demo_canvas* canvas, const es_renderer* renderer, double frame_milliseconds);
 void demo_draw_help(demo_canvas* canvas);
 /* Any image of the renderer as something to look at: radiance tone-mapped, depth as grey, normals and ids as colours. */

@@ -13,11 +13,11 @@ typedef struct player {
     demo_session session;
     es_window* window;
     fly_camera fly;
-    size_t image;                   /* index into the renderer's images; 0 is the displayed one */
+    size_t image; /* index into the renderer's images; 0 is the displayed one */
     bool paused, single_step, show_vpls, show_points, show_timings, show_help;
     uint32_t* canvas;
     size_t canvas_pixels;
-    double frame_milliseconds;      /* smoothed */
+    double frame_milliseconds; /* smoothed */
 } player;
 
 static size_t image_index(const char* name)
@@ -48,7 +48,8 @@ static void take_keys(player* p, const es_window_input* input)
     if (input->pressed['T']) p->show_timings = !p->show_timings;
     if (input->pressed['H'] || input->pressed[ES_KEY_F1]) p->show_help = !p->show_help;
     if (input->pressed['G']) p->session.settings.method = (p->session.settings.method + 1) % 3;
-    if (input->pressed['+'] || input->pressed['=']) p->session.settings.exposure = fminf(p->session.settings.exposure + 0.25f, 20);
+    if (input->pressed['+'] || input->pressed['='])
+        p->session.settings.exposure = fminf(p->session.settings.exposure + 0.25f, 20);
     if (input->pressed['-']) p->session.settings.exposure = fmaxf(p->session.settings.exposure - 0.25f, -20);
     if (input->pressed['R']) fly_camera_reset(&p->fly, p->session.world);
 }
@@ -72,12 +73,13 @@ static int present(player* p)
     const char* name = es_image_name(p->image);
     if (p->image != 0) {
         es_image image = {0};
-        if (es_renderer_image(renderer, name, &image) == ES_OK) demo_draw_image(&canvas, &image, name, p->session.settings.exposure);
+        if (es_renderer_image(renderer, name, &image) == ES_OK)
+            demo_draw_image(&canvas, &image, name, p->session.settings.exposure);
         es_image_destroy(p->session.context, &image);
     }
     es_raster_view view;
-    if ((p->show_vpls || p->show_points) &&
-        es_world_camera_view(p->session.world, es_world_active_camera(p->session.world), canvas.width, canvas.height, &view) == ES_OK) {
+    if ((p->show_vpls || p->show_points) && es_world_camera_view(p->session.world, es_world_active_camera(p->session.world),
+                                                canvas.width, canvas.height, &view) == ES_OK) {
         es_image depth = {0};
         if (es_image_name_count() > 1 && image_index("depth")) es_renderer_image(renderer, "depth", &depth);
         if (p->show_points) demo_draw_points(&canvas, renderer, &view, &depth, 0);
@@ -88,8 +90,8 @@ static int present(player* p)
     if (p->show_help) demo_draw_help(&canvas);
     int scale = canvas.width >= 640 ? 2 : 1;
     char line[160];
-    snprintf(line, sizeof line, "%s  %s%s  %.0f ms", name, demo_method_name(p->session.settings.method), p->paused ? "  paused" : "",
-        p->frame_milliseconds);
+    snprintf(line, sizeof line, "%s  %s%s  %.0f ms", name, demo_method_name(p->session.settings.method),
+        p->paused ? "  paused" : "", p->frame_milliseconds);
     if (!p->show_timings) demo_draw_text(&canvas, 4 * scale, 4 * scale, scale, 0xffffff, line);
     es_window_present(p->window, canvas.pixels, canvas.width, canvas.height);
     return DEMO_OK;
@@ -113,17 +115,20 @@ static int play_loop(player* p)
         }
         float dt = !p->paused ? elapsed : p->single_step ? 1.0f / 30 : 0;
         p->single_step = false;
-        if (fly_camera_update(&p->fly, p->session.world, &input, elapsed) != DEMO_OK || es_world_step(p->session.world, dt) != ES_OK ||
+        if (fly_camera_update(&p->fly, p->session.world, &input, elapsed) != DEMO_OK ||
+            es_world_step(p->session.world, dt) != ES_OK ||
             es_renderer_configure(p->session.renderer, &p->session.settings) != ES_OK ||
             es_renderer_render(p->session.renderer, p->session.world) != ES_OK)
             return demo_refuse_context(p->session.context);
         if (present(p) != DEMO_OK) return DEMO_BAD_INPUT;
         double spent = demo_seconds() - now;
-        if (spent < 1.0 / 120) usleep((useconds_t)((1.0 / 120 - spent) * 1e6)); /* a paused scene costs nothing; nor should this loop */
+        if (spent < 1.0 / 120)
+            usleep((useconds_t)((1.0 / 120 - spent) * 1e6)); /* a paused scene costs nothing; nor should this loop */
     }
 }
 
-/* ---- without a window -------------------------------------------------------------------------------------------------------------- */
+/* ---- without a window
+ * -------------------------------------------------------------------------------------------------------------- */
 
 /* A scene's name or a file's stem, with letters that suit every file system. */
 static void frame_stem(const char* scene, char stem[64])
@@ -184,8 +189,8 @@ static int play_to_files(const demo_options* given, const char* why)
     demo_expand_pattern(options.out, options.first, first);
     demo_expand_pattern(options.out, options.end - 1, last);
     char* path = realpath(first, NULL);
-    printf("%s%u frame%s of %s rendered: %s%s%s\n", why, options.end - options.first, options.end - options.first > 1 ? "s" : "", options.scene,
-        path ? path : first, options.end - options.first > 1 ? " to " : "",
+    printf("%s%u frame%s of %s rendered: %s%s%s\n", why, options.end - options.first, options.end - options.first > 1 ? "s" : "",
+        options.scene, path ? path : first, options.end - options.first > 1 ? " to " : "",
         options.end - options.first > 1 ? (strrchr(last, '/') ? strrchr(last, '/') + 1 : last) : "");
     free(path);
     return DEMO_OK;

@@ -24,8 +24,9 @@ static void add_frame_stats(demo_text* text, uint32_t frame, const es_frame_stat
     }
     const es_raster_stats* raster = &stats->raster;
     demo_text_add(text,
-        "],\n \"raster\":{\"instances\":%" PRIu64 ",\"instances_culled\":%" PRIu64 ",\"triangles\":%" PRIu64 ",\"triangles_culled\":%" PRIu64
-        ",\"triangles_clipped\":%" PRIu64 ",\"tile_triangles\":%" PRIu64 ",\"tile_triangles_hidden\":%" PRIu64 ",\"pixels\":%" PRIu64 "}}",
+        "],\n \"raster\":{\"instances\":%" PRIu64 ",\"instances_culled\":%" PRIu64 ",\"triangles\":%" PRIu64
+        ",\"triangles_culled\":%" PRIu64 ",\"triangles_clipped\":%" PRIu64 ",\"tile_triangles\":%" PRIu64
+        ",\"tile_triangles_hidden\":%" PRIu64 ",\"pixels\":%" PRIu64 "}}",
         raster->instances, raster->instances_culled, raster->triangles, raster->triangles_culled, raster->triangles_clipped,
         raster->tile_triangles, raster->tile_triangles_hidden, raster->pixels);
 }
@@ -34,7 +35,8 @@ static int write_frame(const demo_options* options, demo_session* session, uint3
 {
     for (size_t i = 0; i < options->image_count; i++) {
         es_image image = {0};
-        if (es_renderer_image(session->renderer, options->images[i], &image) != ES_OK) return demo_refuse_context(session->context);
+        if (es_renderer_image(session->renderer, options->images[i], &image) != ES_OK)
+            return demo_refuse_context(session->context);
         int code = DEMO_OK;
         if (options->hash) printf("frame %u %s %016" PRIx64 "\n", frame, options->images[i], es_image_hash(&image));
         if (options->out) {
@@ -55,7 +57,8 @@ int demo_render_frames(const demo_options* given, bool show_progress)
     if (!options.image_count) options.images[options.image_count++] = es_image_name(0);
     if (options.out) {
         char path[DEMO_PATH_SIZE];
-        if (options.image_count > 1) return demo_refuse("--out takes one image; %zu were named with --image", options.image_count);
+        if (options.image_count > 1)
+            return demo_refuse("--out takes one image; %zu were named with --image", options.image_count);
         if (demo_check_pattern(options.out, options.end - options.first) != DEMO_OK) return DEMO_BAD_INPUT;
         demo_expand_pattern(options.out, options.first, path);
         if (demo_check_writable(path) != DEMO_OK) return DEMO_BAD_INPUT;
@@ -87,7 +90,8 @@ int demo_render_frames(const demo_options* given, bool show_progress)
     if (terminal) fputs("\r\033[K", stderr);
     if (code == DEMO_OK && options.stats) {
         demo_text_add(&stats, "],\n\"peak_bytes\":%zu}\n", es_context_peak_bytes(session.context));
-        code = stats.failed ? demo_refuse("%s: out of memory", options.stats) : demo_write_text(options.stats, stats.bytes, stats.size);
+        code = stats.failed ? demo_refuse("%s: out of memory", options.stats)
+                            : demo_write_text(options.stats, stats.bytes, stats.size);
     }
     demo_text_free(&stats);
     demo_session_close(&session);

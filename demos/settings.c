@@ -29,7 +29,8 @@ static int refuse_unknown(const char* name)
     return demo_refuse("--set %s: no such setting; `earthshine settings` lists all", name);
 }
 
-int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer)
+int demo_apply_settings(
+    es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer)
 {
     *world = es_default_world_settings();
     *renderer = es_default_renderer_settings();
@@ -52,8 +53,10 @@ int demo_apply_settings(es_context* context, const demo_options* options, es_wor
             return refuse_unknown(name);
         if (result != ES_OK) return demo_refuse_context(context);
     }
-    if (renderer->width < 1 || renderer->height < 1 || renderer->width > ES_RASTER_MAX_SIZE || renderer->height > ES_RASTER_MAX_SIZE)
-        return demo_refuse("an image of %ux%u: from 1x1 to %dx%d is accepted", renderer->width, renderer->height, ES_RASTER_MAX_SIZE, ES_RASTER_MAX_SIZE);
+    if (renderer->width < 1 || renderer->height < 1 || renderer->width > ES_RASTER_MAX_SIZE ||
+        renderer->height > ES_RASTER_MAX_SIZE)
+        return demo_refuse("an image of %ux%u: from 1x1 to %dx%d is accepted", renderer->width, renderer->height,
+            ES_RASTER_MAX_SIZE, ES_RASTER_MAX_SIZE);
     return DEMO_OK;
 }
 
@@ -66,13 +69,20 @@ static void print_setting(const es_setting* setting)
 {
     char range[512];
     switch (setting->type) {
-    case ES_SETTING_BOOL: snprintf(range, sizeof range, "true|false"); break;
-    case ES_SETTING_CHOICE: snprintf(range, sizeof range, "%s", setting->choices); break;
-    default: snprintf(range, sizeof range, "%.9g … %.9g", setting->minimum, setting->maximum); break;
+    case ES_SETTING_BOOL:
+        snprintf(range, sizeof range, "true|false");
+        break;
+    case ES_SETTING_CHOICE:
+        snprintf(range, sizeof range, "%s", setting->choices);
+        break;
+    default:
+        snprintf(range, sizeof range, "%.9g … %.9g", setting->minimum, setting->maximum);
+        break;
     }
     /* Padded by hand: printf counts the bytes of the ellipsis, not its one column. */
     int columns = (int)strlen(range) - (strstr(range, "…") ? 2 : 0);
-    printf("%-22s %-10s %s%*s %s\n", setting->name, setting->default_text, range, columns < 26 ? 26 - columns : 0, "", setting->help);
+    printf("%-22s %-10s %s%*s %s\n", setting->name, setting->default_text, range, columns < 26 ? 26 - columns : 0, "",
+        setting->help);
 }
 
 int demo_settings(int count, char** arguments)

@@ -1,0 +1,244 @@
+#!/usr/bin/env bash
+# The command line: every command, its results, its exit codes, and one line of refusal for everything that cannot be done.
+# usage: cli.sh BUILD_DIR SOURCE_DIR
+set -u
+program=$1/earthshine
+if [ ! -x "$program" ]; then
+    echo "skipped: the program is not built (EARTHSHINE_DEMOS)"
+    exit 77
+fi
+work=$(mktemp -d)
+trap 'chmod -R u+w "$work"; rm -rf "$work"' EXIT
+cd "$work" || exit 1
+unset DISPLAY WAYLAND_DISPLAY
+checks=0
+failures=0
+small=(--size 64x48 --threads 2 --set vpl.count=64 --set ism.points=1024 --set ism.pool=65536 --set ism.size=32)
+
+fail()
+{
+    failures=$((failures + 1))
+    echo "FAILED: $1"
+    sed 's/^/    stdout: /' out | head -n 5
+    sed 's/^/    stderr: /' err | head -n 5
+}
+
+# expect CODE ARGUMENTS…: runs the program, leaves its streams in out and err
+expect()
+{
+    local code=$1 got
+    shift
+    checks=$((checks + 1))
+    timeout 120 "$program" "$@" >out 2>err </dev/null
+    got=$?
+    [ $got -eq "$code" ] || fail "exit $got instead of $code: earthshine $*"
+}
+
+# refused TEXT ARGUMENTS…: exit 2, nothing on stdout, and one line that contains TEXT besides warnings
+refused()
+{
+    local text=$1
+    shift
+    expect 2 "$@"
+    [ ! -s out ] || fail "a refusal writes to stdout: earthshine $*"
+    [ "$(grep -vc '^earthshine: warning: ' err)" = 1 ] || fail "a refusal is not one line: earthshine $*"
+    grep -qF -- "$text" err || fail "the refusal does not say '$text': earthshine $*"
+}
+
+says()
+{
+    grep -qE -- "$1" "${2:-out}" || fail "no line matches '$1'"
+}
+
+# ---- listings --------------------------------------------------------------------------------------------------------
+expect 0 help
+says '^usage:'
+expect 0 render --help
+says '^usage:'
+expect 0 --version
+says '^earthshine [0-9]+\.[0-9]+\.[0-9]+ \('
+expect 0 scenes
+for scene in cornell room hall; do says "^$scene +[^ ]"; done
+expect 0 settings
+says '^width +1024 '
+says '^triangles '
+expect 0 images
+for image in display direct indirect depth normal motion albedo; do says "^$image +[^ ]"; done
+expect 2
+refused 'did you mean render' rendr
+refused 'unknown command' frobnicate
+refused 'takes no arguments' scenes all
+
+# ---- render ----------------------------------------------------------------------------------------------------------
+expect 0 render cornell "${small[@]}" --hash
+says '^frame 0 display [0-9a-f]{16}$'
+[ "$(wc -l <out)" = 1 ] || fail 'one frame, one hash'
+cp out first
+expect 0 render cornell "${small[@]}" --hash --no-skip --threads 1 --isa scalar
+cmp -s out first || fail 'the hash depends on threads, instruction set or skipping'
+expect 0 render cornell "${small[@]}" --frames 1:3 --fps 10 --hash --image depth --image direct
+says '^frame 1 depth '
+says '^frame 2 direct '
+[ "$(wc -l <out)" = 4 ] || fail 'two frames of two images, four hashes'
+cp out later
+expect 0 render cornell "${small[@]}" --frames 2:3 --fps 10 --hash --image depth
+grep -qxF "$(cat out)" later || fail 'a frame depends on whether the one before was rendered'
+expect 0 render cornell "${small[@]}" --out 'a%%b-%03d.png' --frames 0:2
+[ -s 'a%b-000.png' ] && [ -s 'a%b-001.png' ] || fail 'frames are not where the pattern says'
+expect 0 render cornell "${small[@]}" --out=one.exr --image=indirect --gi ism --set exposure=1 --stats stats.json
+[ -s one.exr ] || fail 'no EXR file'
+expect 0 render cornell "${small[@]}" --out one.hdr --gi none
+[ -s one.hdr ] || fail 'no HDR file'
+[ "$(find . -name '*.tmp*' -o -name '.earthshine*' | wc -l)" = 0 ] || fail 'temporary files are left behind'
+if command -v python3 >/dev/null; then
+    checks=$((checks + 1))
+    python3 - <<'PYTHON' >out 2>err || fail 'the statistics are not as described'
+import json
+stats = json.load(open('stats.json'))
+assert set(stats) >= {'machine', 'frames', 'peak_bytes'}, stats.keys()
+assert set(stats['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit', 'flags'}
+assert stats['machine']['threads'] == 2 and stats['peak_bytes'] > 0
+frame, = stats['frames']
+assert frame['frame'] == 0 and frame['ms'] > 0
+for a_pass in frame['passes']:
+    assert set(a_pass) >= {'name', 'ms', 'skipped', 'count'}
+    assert a_pass['skipped'] is None or a_pass['skipped'] != ''
+assert any(p['skipped'] is None for p in frame['passes'])
+PYTHON
+fi
+
+refused 'scene' render
+refused 'nothing would come of it' render cornell
+refused 'cornel' render cornel --hash
+refused 'did you mean --size' render cornell --siez 64x48 --hash
+refused 'a value must follow' render cornell --hash --size
+refused 'two' render cornell room --hash
+for size in 0x0 0x10 20000x20000 8193x10 64 x 64x 64x48x2 -5x10 1e3x10 99999999999x1; do refused "--size $size" render cornell --hash --size $size; done
+refused 'width' render cornell --hash --set width=20000
+refused 'holds no frame' render cornell --hash --frames 3:3
+refused 'A:B is expected' render cornell --hash --frames 3
+refused 'A:B is expected' render cornell --hash --frames 0:99999999
+refused '--fps 0' render cornell --hash --fps 0
+refused '--fps nan' render cornell --hash --fps nan
+refused '--threads 0' render cornell --hash --threads 0
+refused '--threads 65' render cornell --hash --threads 65
+refused 'scalar, sse4, avx2, avx512 or neon' render cornell --hash --isa mmx
+refused 'none, ism or classic' render cornell --hash --gi photons
+refused 'key=value' render cornell --hash --set exposure
+refused 'did you mean exposure' render cornell --hash --set exposuer=1
+refused 'did you mean triangles' render cornell --hash --set triangels=1
+refused 'no such setting' render cornell --hash --set zzzzzzzzzz=1
+refused 'exposure' render cornell --hash --set exposure=bright
+refused 'exposure' render cornell --hash --set exposure=1e30
+refused 'exposure' render cornell --hash --set exposure=nan
+refused 'vpl.count' render cornell --hash --set vpl.count=-1
+refused 'did you mean indirect' render cornell --hash --image indirekt
+
+# ---- output that cannot be -------------------------------------------------------------------------------------------
+mkdir folder locked
+refused '.exr, .png or .hdr' render cornell --out picture.jpg
+refused '.exr, .png or .hdr' render cornell --out picture
+refused 'put %04d' render cornell --out one.png --frames 0:2
+refused 'may stand for' render cornell --out '%s.png'
+refused 'may stand for' render cornell --out '%n%d.png'
+refused 'may stand for' render cornell --out '%*d.png'
+refused 'may stand for' render cornell --out '%99d.png'
+refused 'may stand for' render cornell --out 'x.png%'.png
+refused 'one frame number' render cornell --out '%d-%d.png'
+refused 'no directory' render cornell --out nowhere/at/all.png
+refused 'not a directory' render cornell --out one.exr/x.png
+refused 'cannot be written' render cornell --out /proc/x.png
+mkdir folder.png
+refused 'not a file' render cornell --out folder.png
+refused 'no directory' render cornell --hash --stats nowhere/stats.json
+refused 'not a file' render cornell --hash --stats folder
+refused 'takes one image' render cornell --out x.png --image depth --image direct
+if [ "$(id -u)" != 0 ]; then
+    chmod a-w locked
+    refused 'cannot be written' render cornell --out locked/x.png
+fi
+[ "$(find folder locked folder.png -type f | wc -l)" = 0 ] || fail 'a refusal leaves files behind'
+
+# ---- input that cannot be --------------------------------------------------------------------------------------------
+: >empty.glb
+: >empty.gltf
+printf 'glTF\002\000\000\000' >short.glb
+printf 'this is a letter, not a model\n' >letter.glb
+printf '{"asset":{"version":"2.0"' >cut.gltf
+printf '{"asset":{"version":"1.0"}}' >old.gltf
+printf '{"asset":{"version":"2.0"},"extensionsRequired":["ACME_teapots"],"extensionsUsed":["ACME_teapots"]}' >acme.gltf
+head -c 4096 /dev/urandom >noise.glb
+refused 'missing.glb' render missing.glb --hash
+refused 'folder' render folder --hash
+for file in empty.glb empty.gltf short.glb letter.glb cut.gltf old.gltf noise.glb one.exr; do refused "$file" render $file --hash; done
+refused 'ACME_teapots' render acme.gltf --hash
+
+# ---- compare ---------------------------------------------------------------------------------------------------------
+expect 0 render cornell "${small[@]}" --out a.exr --image direct
+expect 0 render cornell "${small[@]}" --out b.exr --image direct --frames 1:2 --fps 2
+expect 0 compare a.exr a.exr
+for name in rmse relrmse relmse max; do says "^$name 0$"; done
+expect 0 compare a.exr b.exr --diff diff.png
+says '^rmse 0\.[0-9]+'
+[ -s diff.png ] || fail 'no picture of the difference'
+[ "$(wc -l <out)" = 4 ] || fail 'a value a line'
+expect 1 compare a.exr b.exr --max-rmse 1e-9
+says '^rmse '
+says 'limit' err
+expect 1 compare a.exr b.exr --max-max 1e-9
+expect 0 compare a.exr b.exr --max-rmse 1000 --max-relrmse 1000 --max-relmse 1000 --max-max 1000
+expect 0 render cornell "${small[@]}" --size 32x48 --out other.exr --image direct
+refused 'equal sizes' compare a.exr other.exr
+refused 'two images' compare a.exr
+refused 'third' compare a.exr a.exr a.exr
+refused 'missing.exr' compare a.exr missing.exr
+refused 'letter.glb' compare letter.glb a.exr
+refused 'empty.glb' compare a.exr empty.glb
+head -c 200 a.exr >cut.exr
+refused 'cut.exr' compare a.exr cut.exr
+refused '--max-rmse' compare a.exr b.exr --max-rmse small
+refused 'unknown option' compare a.exr b.exr --max-flop 1
+refused 'no directory' compare a.exr b.exr --diff nowhere/d.png
+refused 'must end in' compare a.exr b.exr --diff d.txt
+
+# ---- play without a display ------------------------------------------------------------------------------------------
+expect 0 play cornell "${small[@]}" --frames 0:2
+[ -s frames/cornell-0000.png ] && [ -s frames/cornell-0001.png ] || fail 'play leaves no frames'
+says 'frames/cornell-0000\.png'
+[ "$(wc -l <out)" = 1 ] || fail 'play says in one line where the frames are'
+expect 0 play "${small[@]}"
+[ "$(find frames -name 'cornell-*.png' | wc -l)" = 60 ] || fail 'play leaves 60 frames of the default scene'
+expect 0 play cornell "${small[@]}" --out 'p%d.png' --frames 0:1
+[ -s p0.png ] || fail 'play --out'
+mkdir sealed
+: >sealed/frames
+(
+    cd sealed || exit 1
+    TMPDIR=$work/folder timeout 120 "$program" play cornell "${small[@]}" --frames 0:1 >../out 2>../err
+) || fail 'play where no frames can be written'
+says "$work/folder/earthshine-.*/cornell-0000\.png"
+refused 'missing.glb' play missing.glb
+
+# ---- bench -----------------------------------------------------------------------------------------------------------
+refused 'unknown benchmark' bench sped
+refused 'did you mean gbuffer-70k' bench speed --only gbuffer-7k
+refused '--runs 0' bench speed --runs 0
+refused 'cannot be written' bench speed --out /proc/self
+expect 0 bench speed --runs 1 --no-peer --only gbuffer-70k --out figures
+says '^gbuffer-70k +[0-9.]+ ms '
+for ending in json csv svg html; do [ -s figures/speed.$ending ] || fail "no speed.$ending"; done
+if command -v python3 >/dev/null; then
+    checks=$((checks + 1))
+    python3 - <<'PYTHON' >out 2>err || fail 'speed.json is not as described'
+import json, xml.etree.ElementTree
+report = json.load(open('figures/speed.json'))
+row, = report['rows']
+assert row['id'] == 'gbuffer-70k' and row['value'] > 0 and row['unit'] == 'ms' and row['ratio'] is None, row
+assert set(row) >= {'id', 'value', 'unit', 'peer', 'peer_value', 'ratio'}
+assert set(report['machine']) >= {'processor', 'isa', 'threads'}
+xml.etree.ElementTree.parse('figures/speed.svg')
+PYTHON
+fi
+
+echo "$checks checks, $failures failed"
+[ $failures -eq 0 ]
