@@ -1,0 +1,132 @@
+/* The geometry-aware box filter on one block of the image (gi/filter.h). */
+#include "gi/filter.h"
+#include "gi/kernel_table.h"
+#include "platform/simd.h"
+#include "raster/pack.h"
+
+/* Column (or row) i of `count`, which may lie outside by less than n: the place n further in; -1 when that is outside as well. */
+static int64_t folded(int64_t i, int64_t count, int64_t n)
+{
+    if (i < 0) i += n;
+    else if (i >= count) i -= n;
+    return i >= 0 && i < count ? i : -1;
+}
+
+/* Column x, outside the image, of a line whose taps are [begin, end) */
+static void fold(const es_filter_job* job, es_filter_scratch* s, int64_t x, int64_t begin, int64_t end)
+{
+    const size_t at = (size_t)(x - begin);
+    const int64_t from = folded(x, job->gbuffer->width, job->size);
+    /* what folds to a place beyond the margin is not a tap of any pixel of the block */
+    const bool here = from >= begin && from < end;
+    const size_t copy = here ? (size_t)(from - begin) : 0;
+    s->depth_in[at] = here ? s->depth_in[copy] : -1e30f; /* close to no depth */
+    for (int k = 0; k < 3; k++) s->normal_in[k][at] = here ? s->normal_in[k][copy] : 0.0f;
+    for (uint32_t k = 0; k < job->plane_count; k++) s->in[k][at] = here ? s->in[k][copy] : 0.0f;
+}
+
+/* Taps of one line: columns [x0 - margin, x0 + ES_FILTER_COLUMNS + margin) of row y. */
+static void load_line(const es_filter_job* job, uint32_t x0, uint32_t y, es_filter_scratch* s)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const size_t row = (size_t)y * g->stride;
+    const int64_t begin = (int64_t)x0 - ES_FILTER_MARGIN, end = (int64_t)x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN;
+    /* strides are multiples of eight */
+    for (int64_t x = begin; x < end; x += VW) {
+        if (x < 0 || x >= g->stride) continue;
+        size_t at = (size_t)(x - begin);
+        vf nx, ny, nz;
+        es_unpack_normal_v(vi_load(g->normal + row + x), &nx, &ny, &nz);
+        vf_store(s->depth_in + at, vf_load(g->depth + row + x));
+        vf_store(s->normal_in[0] + at, nx);
+        vf_store(s->normal_in[1] + at, ny);
+        vf_store(s->normal_in[2] + at, nz);
+        for (uint32_t k = 0; k < job->plane_count; k++) vf_store(s->in[k] + at, vf_load(job->source[k] + row + x));
+    }
+    for (int64_t x = begin; x < 0; x++) fold(job, s, x, begin, end);
+    for (int64_t x = begin > g->width ? begin : g->width; x < end; x++) fold(job, s, x, begin, end);
+}
+
+/* `planes` is a constant at every call */
+VINL void filter_row(const es_filter_job* job, const es_filter_scratch* s, uint32_t columns, uint32_t line, es_filter_scratch* out, uint32_t planes)
+{
+    const int32_t n = (int32_t)job->size;
+    const vf depth_threshold = vf_set1(job->depth_threshold), normal_threshold = vf_set1(job->normal_threshold), one = vf_set1(1.0f);
+    for (uint32_t x = 0; x < columns; x += VW) {
+        const uint32_t c = x + ES_FILTER_MARGIN;
+        vf depth = vf_load(s->depth_in + c), limit = depth * depth_threshold;
+        vf nx = vf_load(s->normal_in[0] + c), ny = vf_load(s->normal_in[1] + c), nz = vf_load(s->normal_in[2] + c);
+        vf sum[6], count = vf_zero();
+        for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
+        for (int32_t i = -(n / 2); i < n - n / 2; i++) {
+            const uint32_t t = (uint32_t)((int32_t)c + i);
+            vf dot = nx * vf_load(s->normal_in[0] + t) + ny * vf_load(s->normal_in[1] + t) + nz * vf_load(s->normal_in[2] + t);
+            vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth_in + t) - depth), limit);
+            if (i == 0) counts = vm_all_lanes();
+            count = count + vf_and(counts, one);
+            for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(s->in[k] + t));
+        }
+        vf share = one / count;
+        vf_store(out->depth[line] + x, depth);
+        vf_store(out->normal[0][line] + x, nx);
+        vf_store(out->normal[1][line] + x, ny);
+        vf_store(out->normal[2][line] + x, nz);
+        for (uint32_t k = 0; k < planes; k++) vf_store(out->mid[k][line] + x, sum[k] * share);
+    }
+}
+
+/* lines[0 … taps): those of the window, `centre` is the pixel's own */
+VINL void filter_column(const es_filter_job* job, const es_filter_scratch* s, const uint32_t* lines, uint32_t taps, uint32_t centre, uint32_t columns, size_t out, uint32_t planes)
+{
+    const vf depth_threshold = vf_set1(job->depth_threshold), normal_threshold = vf_set1(job->normal_threshold), one = vf_set1(1.0f);
+    for (uint32_t x = 0; x < columns; x += VW) {
+        vf depth = vf_load(s->depth[centre] + x), limit = depth * depth_threshold;
+        vf nx = vf_load(s->normal[0][centre] + x), ny = vf_load(s->normal[1][centre] + x), nz = vf_load(s->normal[2][centre] + x);
+        vf sum[6], count = vf_zero();
+        for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
+        for (uint32_t i = 0; i < taps; i++) {
+            const uint32_t t = lines[i];
+            vf dot = nx * vf_load(s->normal[0][t] + x) + ny * vf_load(s->normal[1][t] + x) + nz * vf_load(s->normal[2][t] + x);
+            vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth[t] + x) - depth), limit);
+            if (t == centre) counts = vm_all_lanes();
+            count = count + vf_and(counts, one);
+            for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(s->mid[k][t] + x));
+        }
+        vf share = one / count;
+        for (uint32_t k = 0; k < planes; k++) vf_store(job->result[k] + out + x, sum[k] * share);
+    }
+}
+
+void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0, es_filter_scratch* s)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const uint32_t n = job->size;
+    const uint32_t y1 = g->height - y0 < ES_FILTER_ROWS ? g->height : y0 + ES_FILTER_ROWS;
+    const uint32_t columns = g->width - x0 < ES_FILTER_COLUMNS ? (g->width - x0 + VW - 1) / VW * VW : ES_FILTER_COLUMNS;
+    /* rows that taps of this block fall on, folded ones included */
+    const uint32_t inner = n - n / 2 - 1;
+    uint32_t first = y0 > n / 2 ? y0 - n / 2 : 0, end = y1 + inner;
+    if (end > g->height) {
+        end = g->height;
+        if (first > (end > n ? end - n : 0)) first = end > n ? end - n : 0;
+    }
+    if (end < n) end = n < g->height ? n : g->height;
+
+    for (uint32_t y = first; y < end; y++) {
+        load_line(job, x0, y, s);
+        if (job->plane_count == 3) filter_row(job, s, columns, y - first, s, 3);
+        else if (job->plane_count == 6) filter_row(job, s, columns, y - first, s, 6);
+        else filter_row(job, s, columns, y - first, s, job->plane_count);
+    }
+    for (uint32_t y = y0; y < y1; y++) {
+        uint32_t lines[ES_FILTER_MAX], taps = 0;
+        for (uint32_t i = 0; i < n; i++) {
+            int64_t from = folded((int64_t)y - n / 2 + i, g->height, n);
+            if (from >= 0) lines[taps++] = (uint32_t)from - first;
+        }
+        size_t out = (size_t)y * g->stride + x0;
+        if (job->plane_count == 3) filter_column(job, s, lines, taps, y - first, columns, out, 3);
+        else if (job->plane_count == 6) filter_column(job, s, lines, taps, y - first, columns, out, 6);
+        else filter_column(job, s, lines, taps, y - first, columns, out, job->plane_count);
+    }
+}

@@ -1,0 +1,181 @@
+/* Interleaved shading (gi/shade.h): one block of the image, all phases of one phase row.
+ *
+ * The pixels of a phase are gathered from the G-buffer into a batch (position, unit normal, sums), all lights of the phase are
+ * applied to the batch one after another, and the sums are scattered back. A light's constants stay in registers and its map in
+ * the caches while it passes over the batch. Eight pixels that the light cannot reach (behind it, or facing away) cost nine
+ * multiplications and a branch.
+ */
+#include "gi/kernel_table.h"
+#include "gi/kernels/surface_simd.h"
+#include "gi/shade.h"
+#include "platform/simd16.h"
+#include "raster/pack.h"
+#include "raster/points.h"
+
+typedef struct lanes_of_phase { uint32_t x0, columns, lanes, y0, rows; } lanes_of_phase; /* lanes: columns rounded up to VW */
+
+static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool with_lobes, bool* any_lobe)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const es_pixel_rays* rays = &job->rays;
+    const uint32_t n = job->interleave;
+    const vf zero = vf_zero();
+    vm lobes = vi_zero();
+    for (uint32_t j = 0; j < p->rows; j++) {
+        uint32_t y = p->y0 + j * n;
+        size_t row = (size_t)y * g->stride;
+        vf fy = vf_set1((float)y), base[3], dir[3];
+        for (int k = 0; k < 3; k++) {
+            base[k] = vf_set1(rays->base[k]) + fy * vf_set1(rays->base_dy[k]);
+            dir[k] = vf_set1(rays->dir[k]) + fy * vf_set1(rays->dir_dy[k]);
+        }
+        for (uint32_t i = 0; i < p->lanes; i += VW) {
+            uint32_t at = j * p->lanes + i;
+            vm inside = vm_first((int32_t)(p->columns - i < VW ? p->columns - i : VW));
+            /* lanes past the end read the block's first column */
+            vi x = vi_set1((int32_t)p->x0) + (inside & ((vi_iota() + vi_set1((int32_t)i)) * vi_set1((int32_t)n)));
+            vf fx = vf_from_int(x);
+            vf depth = vf_gather(g->depth + row, x);
+            vf nx, ny, nz, q[3];
+            es_unpack_normal_v(vi_gather(g->normal + row, x), &nx, &ny, &nz);
+            vm seen = inside & vm_gt(depth, zero);
+            for (int k = 0; k < 3; k++) {
+                vf d = dir[k] + fx * vf_set1(rays->dir_dx[k]);
+                q[k] = (base[k] + fx * vf_set1(rays->base_dx[k])) + depth * d;
+            }
+            vf_store(batch->px + at, q[0]);
+            vf_store(batch->py + at, q[1]);
+            vf_store(batch->pz + at, q[2]);
+            vf_store(batch->nx + at, vf_and(seen, nx));
+            vf_store(batch->ny + at, vf_and(seen, ny));
+            vf_store(batch->nz + at, vf_and(seen, nz));
+            for (int k = 0; k < 3; k++) vf_store(batch->e[k] + at, zero);
+            if (!with_lobes) continue;
+            vf v[3];
+            for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
+            vf s = vf_set1(1.0f) / vf_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+            vf_store(batch->vx + at, vf_and(seen, v[0] * s));
+            vf_store(batch->vy + at, vf_and(seen, v[1] * s));
+            vf_store(batch->vz + at, vf_and(seen, v[2] * s));
+            es_surface_v surface = es_surface_of_gbuffer_v(vi_gather(g->albedo_rg + row, x), vi_gather(g->albedo_b + row, x), vi_gather(g->surface + row, x));
+            for (int k = 0; k < 3; k++) {
+                lobes |= seen & vm_gt(surface.specular[k], zero);
+                vf_store(batch->f0[k] + at, surface.specular[k]);
+                vf_store(batch->s[k] + at, zero);
+            }
+            vf_store(batch->roughness + at, surface.roughness);
+            vi_store(batch->model + at, surface.model);
+        }
+    }
+    *any_lobe = vm_any(lobes);
+}
+
+/* The three switches are constants at every call. */
+VINL void apply_light(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, bool shadowed, bool glossy_light, bool lobes)
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f);
+    const vf ox = vf_set1(light->position[0]), oy = vf_set1(light->position[1]), oz = vf_set1(light->position[2]);
+    const vf nx = vf_set1(light->normal[0]), ny = vf_set1(light->normal[1]), nz = vf_set1(light->normal[2]);
+    const vf tx = vf_set1(light->tangent[0]), ty = vf_set1(light->tangent[1]), tz = vf_set1(light->tangent[2]);
+    const vf bx = vf_set1(light->bitangent[0]), by = vf_set1(light->bitangent[1]), bz = vf_set1(light->bitangent[2]);
+    const vf red = vf_set1(light->color[0]), green = vf_set1(light->color[1]), blue = vf_set1(light->color[2]);
+    const vf bound = vf_set1(job->geometry_bound);
+    const vf half = vf_set1(0.5f * (float)job->map_size), last = vf_set1((float)job->map_size - 0.5f);
+    const vf depth_scale = vf_set1((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance);
+    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
+    const vi size = vi_set1((int32_t)job->map_size);
+
+    for (uint32_t i = 0; i < lanes; i += VW) {
+        vf dx = vf_load(batch->px + i) - ox, dy = vf_load(batch->py + i) - oy, dz = vf_load(batch->pz + i) - oz;
+        vf qz = dx * nx + dy * ny + dz * nz;
+        vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i); /* times -r */
+        vm lit = vm_gt(qz, zero) & vm_lt(pixel_cos, zero);
+        if (!vm_any(lit)) continue;
+        vf r2 = dx * dx + dy * dy + dz * dz;
+        vf r = vf_sqrt(r2);
+        if (shadowed) {
+            vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz;
+            /* lit lanes have r + qz > 0 and |u|, |v| <= 1 up to rounding; the others read the middle of the map */
+            vf s = vf_and(lit, half / (r + qz));
+            vi x = vi_truncate(vf_max(vf_min(qx * s + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * s + half, last), zero));
+            vf depth = vf_from_int(vi_gather16(map, y * size + x));
+            lit &= vm_le(r * depth_scale, depth + bias);
+        }
+        /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
+        vf g = vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * r2), bound));
+        if (!glossy_light && !lobes) {
+            vf_store(batch->e[0] + i, vf_load(batch->e[0] + i) + g * red);
+            vf_store(batch->e[1] + i, vf_load(batch->e[1] + i) + g * green);
+            vf_store(batch->e[2] + i, vf_load(batch->e[2] + i) + g * blue);
+            continue;
+        }
+        if (!vm_any(lit)) continue;
+        vf inverse = one / vf_max(r, vf_set1(1e-18f));
+        vf wx = dx * inverse, wy = dy * inverse, wz = dz * inverse;
+        vf sent[3] = {red, green, blue};
+        if (glossy_light) {
+            es_surface_v surface = {.specular = {vf_set1(light->specular_color[0]), vf_set1(light->specular_color[1]), vf_set1(light->specular_color[2])},
+                .roughness = vf_set1(light->roughness), .model = vi_set1((int32_t)light->model)};
+            vf pass, lobe[3];
+            es_surface_parts_v(&surface, nx, ny, nz, vf_set1(light->incident[0]), vf_set1(light->incident[1]), vf_set1(light->incident[2]), wx, wy, wz, &pass, lobe);
+            for (int k = 0; k < 3; k++) sent[k] = sent[k] * pass + vf_set1(light->power[k]) * lobe[k];
+        }
+        vf pass = one;
+        if (lobes) {
+            es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
+                .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
+            vf lobe[3];
+            es_surface_parts_v(&surface, vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i), vf_neg(wx), vf_neg(wy), vf_neg(wz),
+                vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i), &pass, lobe);
+            for (int k = 0; k < 3; k++) vf_store(batch->s[k] + i, vf_load(batch->s[k] + i) + vf_and(lit, g * sent[k] * lobe[k]));
+        }
+        for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_load(batch->e[k] + i) + vf_and(lit, g * sent[k] * pass));
+    }
+}
+
+static void scatter(const es_gbuffer* g, const lanes_of_phase* p, uint32_t n, float (*from)[ES_SHADE_LANES], float* const to[3])
+{
+    for (uint32_t j = 0; j < p->rows; j++) {
+        size_t row = (size_t)(p->y0 + j * n) * g->stride + p->x0;
+        for (int k = 0; k < 3; k++) {
+            const float* source = from[k] + j * p->lanes;
+            float* result = to[k] + row;
+            for (uint32_t i = 0; i < p->columns; i++) result[(size_t)i * n] = source[i];
+        }
+    }
+}
+
+static void shade_phase(const es_shade_job* job, const es_shade_light* lights, const lanes_of_phase* p, uint32_t phase, es_shade_batch* batch)
+{
+    const uint32_t n = job->interleave, lanes = p->lanes * p->rows;
+    const size_t map_texels = (size_t)job->map_size * job->map_size;
+    bool lobes = false;
+    gather(job, p, batch, job->specular[0] != NULL, &lobes);
+    for (uint32_t v = phase; v < job->vpl_count; v += n * n) {
+        const es_shade_light* light = &lights[v];
+        const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
+        if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, map != NULL, true, true);
+        else if (lobes) apply_light(job, light, map, batch, lanes, map != NULL, false, true);
+        else if (light->glossy) apply_light(job, light, map, batch, lanes, map != NULL, true, false);
+        else if (map) apply_light(job, light, map, batch, lanes, true, false, false);
+        else apply_light(job, light, map, batch, lanes, false, false, false);
+    }
+    scatter(job->gbuffer, p, n, batch->e, job->irradiance);
+    if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);
+}
+
+void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const uint32_t n = job->interleave;
+    for (uint32_t phase_x = 0; phase_x < n; phase_x++) {
+        if (phase_x >= g->width || block->phase_y >= g->height) break;
+        uint32_t columns = (g->width - phase_x + n - 1) / n, rows = (g->height - block->phase_y + n - 1) / n;
+        if (block->column >= columns || block->row >= rows) break;
+        lanes_of_phase p = {.x0 = phase_x + block->column * n, .y0 = block->phase_y + block->row * n};
+        p.columns = columns - block->column < ES_SHADE_COLUMNS ? columns - block->column : ES_SHADE_COLUMNS;
+        p.rows = rows - block->row < block->rows ? rows - block->row : block->rows;
+        p.lanes = (p.columns + VW - 1) / VW * VW;
+        shade_phase(job, lights, &p, phase_x + n * block->phase_y, batch);
+    }
+}

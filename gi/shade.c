@@ -1,0 +1,66 @@
+/* Splits interleaved shading into blocks for the workers (gi/shade.h; the work is in kernels/shade.c).
+ *
+ * A block is a rectangle of up to ES_SHADE_COLUMNS × rows pixels of each phase. Blocks of the same rectangle are handed out
+ * one after another: its G-buffer lines serve all of them. */
+#include "gi/shade.h"
+
+#include <string.h>
+
+#include "gi/kernel_table.h"
+
+typedef struct shade_loop {
+    const es_shade_job* job;
+    const es_shade_light* lights;
+    es_shade_batch* batches;   /* one a worker */
+    const es_gi_kernels* kernels;
+    uint32_t rows, columns_of_blocks;
+} shade_loop;
+
+static void shade_blocks(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const shade_loop* loop = user;
+    const uint32_t n = loop->job->interleave;
+    for (uint32_t i = begin; i < end; i++) {
+        uint32_t rectangle = i / n;
+        es_shade_block block = {
+            .phase_y = i % n,
+            .column = rectangle % loop->columns_of_blocks * ES_SHADE_COLUMNS,
+            .row = rectangle / loop->columns_of_blocks * loop->rows,
+            .rows = loop->rows,
+        };
+        loop->kernels->shade(loop->job, loop->lights, &block, &loop->batches[worker]);
+    }
+}
+
+static es_shade_light light_of(const es_vpl_record* vpl, float scale)
+{
+    es_shade_light light = {.roughness = vpl->roughness, .model = vpl->model, .glossy = vpl->glossy};
+    memcpy(light.position, vpl->position, sizeof light.position);
+    memcpy(light.normal, vpl->normal, sizeof light.normal);
+    memcpy(light.tangent, vpl->tangent, sizeof light.tangent);
+    memcpy(light.bitangent, vpl->bitangent, sizeof light.bitangent);
+    memcpy(light.incident, vpl->incident, sizeof light.incident);
+    memcpy(light.specular_color, vpl->specular_color, sizeof light.specular_color);
+    for (int k = 0; k < 3; k++) {
+        light.color[k] = vpl->flux[k] * (0.318309886f * scale);
+        light.power[k] = vpl->power[k] * scale;
+    }
+    return light;
+}
+
+es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job)
+{
+    const uint32_t n = job->interleave, width = job->gbuffer->width, height = job->gbuffer->height;
+    es_shade_light* lights = es_arena_allocate(arena, ((size_t)job->vpl_count + 1) * sizeof *lights);
+    es_shade_batch* batches = es_arena_allocate(arena, (size_t)es_context_workers(context) * sizeof *batches);
+    if (!lights || !batches) return es_context_last_result(context);
+    for (uint32_t v = 0; v < job->vpl_count; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n));
+
+    shade_loop loop = {.job = job, .lights = lights, .batches = batches, .kernels = es_gi_kernel_table(es_context_isa(context))};
+    uint32_t columns = (width + n - 1) / n, rows = (height + n - 1) / n;
+    loop.rows = ES_SHADE_LANES / ES_SHADE_COLUMNS;
+    loop.columns_of_blocks = (columns + ES_SHADE_COLUMNS - 1) / ES_SHADE_COLUMNS;
+    uint32_t rectangles = loop.columns_of_blocks * ((rows + loop.rows - 1) / loop.rows);
+    es_parallel_for(context, rectangles * n, 1, shade_blocks, &loop);
+    return ES_OK;
+}

@@ -1,0 +1,71 @@
+/* Interleaved shading by virtual point lights (Segovia et al. 2006; Knecht 2009 §3.4, §4.5).
+ *
+ * Pixel (x, y) is of phase (x mod n, y mod n); phase p = x mod n + n (y mod n) is lit by the lights p, p + n², p + 2n², … and
+ * the result is multiplied by n², so that the mean over any n × n pixels has every light once. Per light, with d from light to
+ * pixel, r = |d|:
+ *
+ *     G = min(cos_light · cos_pixel / r², geometry_bound)      Knecht eq. 4.7, the bound being 1 / d²min
+ *     V = r <= map(d) + bias
+ *     irradiance += n² · flux / pi · G · V
+ *
+ * The pixel's own diffuse reflectance, albedo · (1 - metallic) / pi, is applied after the filter. Lobes (gi/surface.h): a glossy light
+ * sends power · f(incident, d) instead of flux / pi; a pixel with a lobe has a second sum, the radiance its lobe reflects to the
+ * eye, and its irradiance is what passes to the diffuse part.
+ */
+#ifndef EARTHSHINE_GI_SHADE_H
+#define EARTHSHINE_GI_SHADE_H
+
+#include "gi/pixel_rays.h"
+#include "gi/vpl.h"
+#include "platform/context.h"
+
+enum { ES_INTERLEAVE_MAX = 16 };
+
+typedef struct es_shade_job {
+    const es_gbuffer* gbuffer;     /* depth and normal; with `specular` also albedo and surface */
+    es_pixel_rays rays;
+    const es_vpl_record* vpls;
+    uint32_t vpl_count;
+    const uint16_t* maps;          /* map v at maps + v · map_size²; NULL: everything sees everything */
+    uint32_t map_size;
+    float far_distance;            /* of the maps */
+    float bias;                    /* metres */
+    float geometry_bound;          /* 1/m² */
+    uint32_t interleave;           /* n, 1 … ES_INTERLEAVE_MAX */
+    /* out, rows of gbuffer->stride; 0 where nothing is seen */
+    float* irradiance[3];
+    float* specular[3];            /* NULL: pixels have no lobes */
+} es_shade_job;
+
+es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job);
+
+/* ---- between shade.c and its kernel -------------------------------------------------------------------------------------- */
+
+typedef struct es_shade_light {
+    float position[3], normal[3], tangent[3], bitangent[3];
+    float color[3];                /* n² · flux / pi */
+    float power[3];                /* n² · power; what follows is used when glossy */
+    float incident[3], specular_color[3], roughness;
+    uint32_t model;
+    bool glossy;
+} es_shade_light;
+
+/* Pixels of one phase inside a block of the image: enough to pay for loading a light, few enough for the first-level cache.
+ * Rows of `columns` lanes, a multiple of eight. */
+enum { ES_SHADE_LANES = 1024, ES_SHADE_COLUMNS = 64 };
+
+typedef struct es_shade_batch {
+    float px[ES_SHADE_LANES], py[ES_SHADE_LANES], pz[ES_SHADE_LANES];
+    float nx[ES_SHADE_LANES], ny[ES_SHADE_LANES], nz[ES_SHADE_LANES]; /* 0 where nothing is seen */
+    float e[3][ES_SHADE_LANES];
+    /* with lobes */
+    float vx[ES_SHADE_LANES], vy[ES_SHADE_LANES], vz[ES_SHADE_LANES];  /* unit, to the eye */
+    float f0[3][ES_SHADE_LANES], roughness[ES_SHADE_LANES];
+    int32_t model[ES_SHADE_LANES];
+    float s[3][ES_SHADE_LANES];
+} es_shade_batch;
+
+/* A block: columns [column, column + ES_SHADE_COLUMNS) and rows [row, row + rows) of each phase of phase row phase_y. */
+typedef struct es_shade_block { uint32_t phase_y, column, row, rows; } es_shade_block;
+
+#endif
