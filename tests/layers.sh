@@ -31,10 +31,18 @@ rank()
 
 # shellcheck disable=SC2086
 files=$(find $floors demos tests -type f \( -name '*.c' -o -name '*.h' -o -name '*.cpp' -o -name '*.inl' -o -name '*.sh' -o -name '*.cmake' \))
+# report WHAT: file:line: from grep
+report()
+{
+    while IFS=: read -r file line _; do fail "$file:$line: $1"; done
+}
+# shellcheck disable=SC2086
+{
+    report "a tab" < <(grep -n $'\t' $files CMakeLists.txt)
+    report "a carriage return" < <(grep -n $'\r' $files CMakeLists.txt)
+    report "blanks at the end of a line" < <(grep -nE ' +$' $files CMakeLists.txt)
+}
 for file in $files CMakeLists.txt; do
-    grep -q $'\t' "$file" && fail "$file:$(grep -n -m 1 $'\t' "$file" | cut -d: -f1): a tab"
-    grep -q $'\r' "$file" && fail "$file:$(grep -n -m 1 $'\r' "$file" | cut -d: -f1): a carriage return"
-    grep -qE ' +$' "$file" && fail "$file:$(grep -nE -m 1 ' +$' "$file" | cut -d: -f1): blanks at the end of a line"
     [ -n "$(tail -c 1 "$file")" ] && fail "$file: the last line has no line feed"
 done
 
@@ -47,6 +55,7 @@ declare -A only_in=(
     ['^(png|pngconf)\.h$|^libpng.*']=platform/image_png.c
     ['^GLFW/.*']=platform/window.c
     ['^(X11|xcb)/.*|^sys/(ipc|shm)\.h$']=platform/window.c
+    ['^zlib\.h$']=platform/image_exr_dwa.c
     ['^(tiny_gltf|stb_.*|json)\.(h|hpp)$|^nlohmann/.*']=sim/import_gltf.cpp
 )
 while IFS=: read -r file line text; do
@@ -109,47 +118,51 @@ libm=$(gcc -print-file-name=libm.so.6 2>/dev/null)
 libm_names=$build/libm_names.txt
 nm -D --defined-only "$libm" | awk '{ sub(/@.*/, "", $3); print $3 }' | grep -E '^[a-z]' | sort -u | grep -vxE 'sqrtf?' >"$libm_names"
 
-definitions=$build/definitions.txt
-: >"$definitions"
-for object in $objects; do
-    file=${object#"$build"/CMakeFiles/*.dir/}
-    file=${file%.o}
-    floor=${file%%/*}
+# Every symbol of every object, once: FILE NAME CLASS SECTION. The state of a file lies in .data*, .bss* or COMMON, but for
+# .data.rel.ro, which is constant once the loader has filled in its addresses.
+symbols=$build/symbols.txt
+# shellcheck disable=SC2086
+nm -A -f sysv $objects | tr -d ' ' | awk -F'|' -v strip="$build/CMakeFiles/" '
+    NF >= 7 {
+        at = index($1, ".o:")
+        file = substr($1, 1, at - 1)
+        file = substr(file, length(strip) + 1)
+        sub(/^[^\/]*\//, "", file)
+        name = substr($1, at + 3)
+        sub(/@.*/, "", name)
+        print file, name, $3, ($7 == "" ? "-" : $7), $4
+    }' >"$symbols"
 
-    # sysv format: Name|Value|Class|Type|Size|Line|Section; what may be written to lies in .data* or .bss*, but for
-    # .data.rel.ro, which is constant once the loader has filled in its addresses
-    state=$(nm -f sysv "$object" | tr -d ' ' | awk -F'|' '
-        $7 ~ /^\.(data|bss|tdata|tbss)/ && $7 !~ /^\.data\.rel\.ro/ && $4 != "SECTION" && $1 !~ /^\./ { print $1 }
-        $7 ~ /COM/ { print $1 }')
-    if [[ $file == *"$importer" ]]; then
-        # <iostream>'s initializer and the guards of the C++ library's own inline functions
-        state=$(grep -vE '^(_ZStL8__ioinit|_ZGVZ?N?(St|K?N?9__gnu_cxx|K?N?8nlohmann|K?N?8tinygltf).*|DW\.ref\.__gxx_personality_v0)$' <<<"$state")
-    fi
-    [ -n "$state" ] && fail "$file keeps state of file scope: $(tr '\n' ' ' <<<"$state")"
+# <iostream>'s initializer and the guards of the C++ library's own inline functions are the importer's to have
+state=$(awk '$4 ~ /^(\.(data|bss|tdata|tbss)|.*COM)/ && $4 !~ /^\.data\.rel\.ro/ && $5 != "SECTION" && $2 !~ /^\./ { print $1, $2 }' "$symbols" |
+    grep -vE "$importer (_ZStL8__ioinit|_ZGVZ?N?(St|K?N?9__gnu_cxx|K?N?8nlohmann|K?N?8tinygltf).*|DW\.ref\.__gxx_personality_v0)$")
+while read -r file name; do
+    [ -n "$file" ] && fail "$file keeps state of file scope: $name"
+done <<<"$state"
 
-    # inline functions and templates that C++ puts into every object are weak; a user's own copy of them is the same
-    strangers=$(nm -g --defined-only "$object" | awk '{ print $2, $3 }' | grep -v ' es_')
-    [[ $file == *"$importer" ]] && strangers=$(grep -vE '^([WVu] _Z|V DW\.ref)' <<<"$strangers")
-    [ -n "$strangers" ] && fail "$file defines global names without the prefix es_: $(cut -d' ' -f2 <<<"$strangers" | head -n 8 | tr '\n' ' ')"
+# inline functions and templates that C++ puts into every object are weak; a user's own copy of them is the same
+strangers=$(awk '$3 ~ /^[A-TV-Zu]$/ && $2 !~ /^es_/ { print $1, $2, $3 }' "$symbols" |
+    grep -vE "$importer (_Z[^ ]* [WVu]|DW\.ref[^ ]* V)$")
+while read -r file name _; do
+    [ -n "$file" ] && fail "$file defines a global name without the prefix es_: $name"
+done <<<"$strangers"
 
-    calls=$(nm -u "$object" | awk '{ sub(/@.*/, "", $2); print $2 }' | sort -u | comm -12 - "$libm_names")
-    # files are not pixels: the pictures that tinygltf would decode never reach this library
-    [[ $file == *"$importer" ]] && calls=$(grep -vxE 'pow|ldexp|frexp|floor|round' <<<"$calls")
-    [ -n "$calls" ] && fail "$file calls libm: $(tr '\n' ' ' <<<"$calls")"
-
-    nm -g --defined-only "$object" | awk -v floor="$floor" '$3 ~ /^es_/ { print $3, floor }' >>"$definitions"
-done
+# files are not pixels: the pictures that tinygltf would decode never reach this library
+calls=$(awk 'NR == FNR { libm[$1] = 1; next } $3 == "U" && ($2 in libm) { print $1, $2 }' "$libm_names" "$symbols" |
+    grep -vE "$importer (pow|ldexp|frexp|floor|round)$")
+while read -r file name; do
+    [ -n "$file" ] && fail "$file calls libm: $name"
+done <<<"$calls"
 
 # A declaration written by hand would get around the rule for includes.
-for object in $objects; do
-    file=${object#"$build"/CMakeFiles/*.dir/}
-    floor=${file%%/*}
-    nm -u "$object" | awk -v floor="$floor" -v file="${file%.o}" '
-        BEGIN { rank["platform"] = 0; rank["raster"] = 1; rank["sim"] = 2; rank["gi"] = 3 }
-        NR == FNR { of[$1] = $2; next }
-        ($2 in of) && rank[of[$2]] > rank[floor] { print file " calls " $2 " of " of[$2] "/" }' "$definitions" -
-done >"$build/calls_upward.txt"
-[ -s "$build/calls_upward.txt" ] && fail "a floor calls a floor above: $(head -n 3 "$build/calls_upward.txt" | tr '\n' ';')"
+upward=$(awk '
+    BEGIN { rank["platform"] = 0; rank["raster"] = 1; rank["sim"] = 2; rank["gi"] = 3 }
+    { floor = $1; sub(/\/.*/, "", floor) }
+    NR == FNR { if ($3 != "U" && $2 ~ /^es_/ && $3 ~ /^[A-Z]$/) of[$2] = floor; next }
+    $3 == "U" && ($2 in of) && rank[of[$2]] > rank[floor] { print $1, $2, of[$2] }' "$symbols" "$symbols")
+while read -r file name floor; do
+    [ -n "$file" ] && fail "$file uses $name of $floor/, a floor above"
+done <<<"$upward"
 
 # ---- exports ----------------------------------------------------------------------------------------------------------
 
