@@ -19,8 +19,7 @@ es_logger demo_logger(void);
 /* The candidate with the least edit distance to `name`, NULL when none is near. */
 const char* demo_nearest(const char* name, const char* const* candidates, size_t count);
 
-/* ---- options (options.c)
- * ----------------------------------------------------------------------------------------------------------- */
+/* ---- options (options.c) ----------------------------------------------------------------------------------------- */
 
 enum { DEMO_MAX_SETS = 64, DEMO_MAX_IMAGES = 32, DEMO_MAX_FRAMES = 1000000 };
 
@@ -49,8 +48,7 @@ bool demo_parse_uint(const char* text, uint32_t minimum, uint32_t maximum, uint3
 bool demo_parse_double(const char* text, double minimum, double maximum, double* value);
 const char* demo_method_name(uint32_t method);
 
-/* ---- settings (settings.c)
- * ------------------------------------------------------------------------------------------------------------ */
+/* ---- settings (settings.c) --------------------------------------------------------------------------------------- */
 
 /* Applies --size, --gi, --no-skip and every --set to the two structs. */
 int demo_apply_settings(
@@ -61,8 +59,7 @@ int demo_images(int count, char** arguments);
 /* Index of an image's name; -1 after a line that suggests the nearest. */
 int demo_find_image(const char* name);
 
-/* ---- a world and its renderer, opened as the options say (session.c)
- * ---------------------------------------------------------------------- */
+/* ---- a world and its renderer, opened as the options say (session.c) --------------------------------------------- */
 
 typedef struct demo_session {
     es_context* context;
@@ -76,8 +73,7 @@ void demo_session_close(demo_session* session);
 /* Brings the world to frame `frame`, which lies at frame / fps seconds: the first call begins at 0. */
 int demo_session_step(demo_session* session, uint32_t frame, double fps);
 
-/* ---- output (output.c)
- * ----------------------------------------------------------------------------------------------------------------------- */
+/* ---- output (output.c) ------------------------------------------------------------------------------------------- */
 
 enum { DEMO_PATH_SIZE = 4096 };
 
@@ -93,8 +89,7 @@ es_image_save_desc demo_save_desc(void);
 /* Writes text to a temporary name and renames it: never a half-written file. */
 int demo_write_text(const char* path, const char* text, size_t size);
 
-/* ---- text that grows (text.c)
- * -------------------------------------------------------------------------------------------------------------------- */
+/* ---- text that grows (text.c) ------------------------------------------------------------------------------------ */
 
 typedef struct demo_text {
     char* bytes;
@@ -106,18 +101,14 @@ void demo_text_add(demo_text* text, const char* format, ...) ES_PRINTF(2, 3);
 void demo_text_add_json_string(demo_text* text, const char* string);
 void demo_text_free(demo_text* text);
 
-/* ---- machine (machine.c)
- * --------------------------------------------------------------------------------------------------------------------------- */
+/* ---- machine (machine.c) ----------------------------------------------------------------------------------------- */
 
 /* {"processor":…,"isa":…,"threads":…,"compiler":…,"commit":…,"flags":…,"version":…} */
 void demo_text_add_machine(demo_text* text, const es_context* context);
 void demo_processor_name(char* name, size_t size);
 double demo_seconds(void);
 
-/* ---- commands
- * -----------------------------------------------------------------------------------------------------------------------------------------
- */
-
+/* ---- commands ---------------------------------------------------------------------------------------------------- */
 int demo_render(int count, char** arguments);
 int demo_play(int count, char** arguments);
 int demo_compare(int count, char** arguments);

@@ -5,7 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* One frame of --stats: {"frame":0,"ms":…,"passes":[{"name":…,"ms":…,"skipped":null|"why","count":…,"unit":…}],"raster":{…}} */
+/* One frame of --stats: {"frame":0,"ms":…,"passes":[{"name":…,"ms":…,"skipped":null|"why","count":…,"unit":…}],
+ *  "raster":{…}} */
 static void add_frame_stats(demo_text* text, uint32_t frame, const es_frame_stats* stats)
 {
     demo_text_add(text, "\n{\"frame\":%u,\"ms\":%.6g,\"passes\":[", frame, stats->milliseconds);
