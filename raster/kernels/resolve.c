@@ -43,11 +43,9 @@ VINL v3 unit(v3 a)
 
 /* The interpolation at eight pixels of one instance. */
 typedef struct surface8 {
-    const es_resolve_job* job;
     const es_prepared_instance* instance;
     vm active, back;             /* back: seen from the side where the winding is clockwise */
     vi index[3];
-    vf x, y;                     /* pixel centres from the view's centre */
     vf w[3], lambda[3];
     vf bx[3], by[3], sum_x, sum_y, inverse;
 } surface8;
@@ -188,7 +186,9 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
     const es_raster_mesh* mesh = instance->mesh;
     const es_prepared_material* material = instance->material;
     const uint32_t planes = job->gbuffer.planes;
-    surface8 s = {.job = job, .instance = instance, .active = active, .x = x, .y = y};
+    surface8 s; /* not initialised as a whole: clearing it cost more than the interpolation */
+    s.instance = instance;
+    s.active = active;
 
     vi triangle = active & (id - vi_set1((int32_t)instance->first_id)), unused;
     out->triangle = triangle + vi_set1(1);
@@ -320,6 +320,13 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
     }
 }
 
+VINL pixel8 nothing(void)
+{
+    vi i = vi_zero();
+    vf f = vf_zero();
+    return (pixel8){i, i, i, i, i, i, i, i, f, f, f};
+}
+
 VINL void merge(vm m, pixel8* to, const pixel8* from)
 {
     to->normal = vi_select(m, from->normal, to->normal);
@@ -348,8 +355,7 @@ void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
             vm seen = vm_gt(vf_load(tile->depth + at), vf_zero()) & vm_first((int32_t)(columns - column));
             uint32_t pending = vm_bits(seen);
             job->pixels += (uint32_t)__builtin_popcount(pending);
-            pixel8 out;
-            memset(&out, 0, sizeof out);
+            pixel8 out = nothing();
             if (pending) {
                 vi id = seen & vi_load(tile->id + at);
                 vf x = vf_set1((float)(tile->x + (int32_t)column) + 0.5f - 0.5f * (float)tile->width) + vf_iota();
@@ -357,8 +363,7 @@ void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
                 while (pending) {
                     int32_t which = instance[__builtin_ctz(pending)];
                     vm active = seen & vi_eq(instance, vi_set1(which));
-                    pixel8 part;
-                    memset(&part, 0, sizeof part);
+                    pixel8 part = nothing();
                     resolve_instance(job, &job->instances[which], active, id, x, y, &part);
                     merge(active, &out, &part);
                     pending &= ~vm_bits(active);
