@@ -4,8 +4,10 @@
 
 #include "gi/compose.h"
 #include "gi/direct.h"
+#include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/pixel_rays.h"
+#include "gi/shade.h"
 #include "gi/vpl.h"
 
 /* X(name, arguments) */
@@ -14,7 +16,10 @@
                      const uint32_t* barycentric, uint32_t count, float* x, float* y, float* z))                 \
     /* rows [row_begin, row_end) */                                                                              \
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
-    X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))
+    X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
+    /* the block whose first pixel is (x, y) */                                                                  \
+    X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))
 
 struct es_gi_kernels {
 #define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;

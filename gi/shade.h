@@ -52,7 +52,7 @@ typedef struct es_shade_light {
 
 /* Pixels of one phase inside a block of the image: enough to pay for loading a light, few enough for the first-level cache.
  * Rows of `columns` lanes, a multiple of eight. */
-enum { ES_SHADE_LANES = 1024, ES_SHADE_COLUMNS = 64 };
+enum { ES_SHADE_LANES = 4096, ES_SHADE_COLUMNS = 128 };
 
 typedef struct es_shade_batch {
     float px[ES_SHADE_LANES], py[ES_SHADE_LANES], pz[ES_SHADE_LANES];

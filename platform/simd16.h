@@ -176,13 +176,11 @@ VINL void vh4_store_min(uint16_t* p, vh4 a)
 }
 #endif
 
-/* Texels base[index] per lane, zero-extended; every index must be valid, masked lanes included. One load and insert per
- * lane: no instruction set gathers 16 bits, and gathering 32 would read past the last texel. */
-VINL vi vi_gather16(const uint16_t* base, vi index)
+/* Texels base[at[0]] … base[at[7]], zero-extended. One load and insert per lane: no instruction set gathers 16 bits, and gathering
+ * 32 would read past the last texel. The places come from memory because loading them is cheaper than taking a register apart. */
+VINL vi vi_gather16_at(const uint16_t* base, const int32_t at[VW])
 {
-#if defined(ES_SIMD_256)
-    uint32_t at[VW];
-    memcpy(at, &index, sizeof at);
+#if defined(ES_SIMD_256) || defined(ES_ISA_SSE4_BODY)
     __m128i low = _mm_cvtsi32_si128(base[at[0]]), high = _mm_cvtsi32_si128(base[at[4]]);
     low = _mm_insert_epi16(low, base[at[1]], 1);
     high = _mm_insert_epi16(high, base[at[5]], 1);
@@ -190,11 +188,23 @@ VINL vi vi_gather16(const uint16_t* base, vi index)
     high = _mm_insert_epi16(high, base[at[6]], 2);
     low = _mm_insert_epi16(low, base[at[3]], 3);
     high = _mm_insert_epi16(high, base[at[7]], 3);
+#if defined(ES_SIMD_256)
     return (vi)_mm256_cvtepu16_epi32(_mm_unpacklo_epi64(low, high));
 #else
-    return (vi){base[index[0]], base[index[1]], base[index[2]], base[index[3]],
-                base[index[4]], base[index[5]], base[index[6]], base[index[7]]};
+    v_halves_ h;
+    h.mi[0] = _mm_cvtepu16_epi32(low);
+    h.mi[1] = _mm_cvtepu16_epi32(high);
+    return h.i;
 #endif
+#else
+    return (vi){base[at[0]], base[at[1]], base[at[2]], base[at[3]], base[at[4]], base[at[5]], base[at[6]], base[at[7]]};
+#endif
+}
+VINL vi vi_gather16(const uint16_t* base, vi index)
+{
+    int32_t at[VW];
+    vi_store(at, index);
+    return vi_gather16_at(base, at);
 }
 
 /* The lanes of `a` whose bit is set in `lanes` go to p[0], p[1], … in order; up to eight words from p on are written. Returns

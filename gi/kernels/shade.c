@@ -133,6 +133,73 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
     }
 }
 
+/* Diffuse light, diffuse pixels: nearly all of the work, so in three short loops over a stretch of the batch. The first lists the vectors
+ * the light can reach, without a branch; the second computes geometry and place in the map, the third looks up and sums. In one
+ * loop the chain of square root, division, look-up and comparison is longer than what a processor keeps in flight. */
+enum { STRETCH = 512 };
+
+VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, const uint16_t* next_map, es_shade_batch* batch, uint32_t lanes, bool shadowed)
+{
+    const vf zero = vf_zero();
+    const vf ox = vf_set1(light->position[0]), oy = vf_set1(light->position[1]), oz = vf_set1(light->position[2]);
+    const vf nx = vf_set1(light->normal[0]), ny = vf_set1(light->normal[1]), nz = vf_set1(light->normal[2]);
+    const vf tx = vf_set1(light->tangent[0]), ty = vf_set1(light->tangent[1]), tz = vf_set1(light->tangent[2]);
+    const vf bx = vf_set1(light->bitangent[0]), by = vf_set1(light->bitangent[1]), bz = vf_set1(light->bitangent[2]);
+    const vf red = vf_set1(light->color[0]), green = vf_set1(light->color[1]), blue = vf_set1(light->color[2]);
+    const vf bound = vf_set1(job->geometry_bound);
+    const vf half = vf_set1(0.5f * (float)job->map_size), last = vf_set1((float)job->map_size - 0.5f);
+    const vf depth_scale = vf_set1((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance);
+    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
+    const vi size = vi_set1((int32_t)job->map_size);
+    uint32_t listed[STRETCH / VW + 1];
+    float geometry[STRETCH], nearest[STRETCH];
+    int32_t place[STRETCH];
+    /* the next light's map comes into the second-level cache meanwhile, a line for each vector of the batch */
+    const uint32_t lines = (uint32_t)(((size_t)job->map_size * job->map_size * sizeof *map + 63) / 64);
+
+    for (uint32_t begin = 0; begin < lanes; begin += STRETCH) {
+        const uint32_t end = lanes - begin < STRETCH ? lanes : begin + STRETCH;
+        uint32_t count = 0;
+        for (uint32_t i = begin; i < end; i += VW) {
+            if (shadowed && i / VW < lines) __builtin_prefetch(next_map + (size_t)(i / VW) * 32, 0, 2);
+            vf dx = vf_load(batch->px + i) - ox, dy = vf_load(batch->py + i) - oy, dz = vf_load(batch->pz + i) - oz;
+            vf qz = dx * nx + dy * ny + dz * nz;
+            vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i); /* times -r */
+            listed[count] = i;
+            count += vm_any(vm_gt(qz, zero) & vm_lt(pixel_cos, zero));
+        }
+        for (uint32_t k = 0; k < count; k++) {
+            const uint32_t i = listed[k];
+            vf dx = vf_load(batch->px + i) - ox, dy = vf_load(batch->py + i) - oy, dz = vf_load(batch->pz + i) - oz;
+            vf qz = dx * nx + dy * ny + dz * nz;
+            vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i);
+            vm lit = vm_gt(qz, zero) & vm_lt(pixel_cos, zero);
+            vf r2 = dx * dx + dy * dy + dz * dz;
+            /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
+            vf_store(geometry + k * VW, vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * r2), bound)));
+            if (!shadowed) continue;
+            vf r = vf_sqrt(r2);
+            vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz;
+            /* lit lanes have r + qz > 0 and |u|, |v| <= 1 up to rounding; the others read the middle of the map */
+            vf s = vf_and(lit, half / (r + qz));
+            vi x = vi_truncate(vf_max(vf_min(qx * s + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * s + half, last), zero));
+            vi_store(place + k * VW, y * size + x);
+            vf_store(nearest + k * VW, r * depth_scale - bias);
+        }
+        for (uint32_t k = 0; k < count; k++) {
+            const uint32_t i = listed[k];
+            vf g = vf_load(geometry + k * VW);
+            if (shadowed) {
+                vf depth = vf_from_int(vi_gather16_at(map, place + k * VW));
+                g = vf_and(vm_le(vf_load(nearest + k * VW), depth), g);
+            }
+            vf_store(batch->e[0] + i, vf_load(batch->e[0] + i) + g * red);
+            vf_store(batch->e[1] + i, vf_load(batch->e[1] + i) + g * green);
+            vf_store(batch->e[2] + i, vf_load(batch->e[2] + i) + g * blue);
+        }
+    }
+}
+
 static void scatter(const es_gbuffer* g, const lanes_of_phase* p, uint32_t n, float (*from)[ES_SHADE_LANES], float* const to[3])
 {
     for (uint32_t j = 0; j < p->rows; j++) {
@@ -157,8 +224,8 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, map != NULL, true, true);
         else if (lobes) apply_light(job, light, map, batch, lanes, map != NULL, false, true);
         else if (light->glossy) apply_light(job, light, map, batch, lanes, map != NULL, true, false);
-        else if (map) apply_light(job, light, map, batch, lanes, true, false, false);
-        else apply_light(job, light, map, batch, lanes, false, false, false);
+        else if (map) apply_diffuse(job, light, map, v + n * n < job->vpl_count ? map + n * n * map_texels : map, batch, lanes, true);
+        else apply_diffuse(job, light, NULL, NULL, batch, lanes, false);
     }
     scatter(job->gbuffer, p, n, batch->e, job->irradiance);
     if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);

@@ -13,7 +13,7 @@
 #include "raster/points.h"
 #include "platform/simd16.h"
 
-enum { BLOCK = 512 };
+enum { STREAMS = 64, BLOCK = STREAMS * VW };
 
 /* at: place | (width - 1) << 20; written eight at a time, hence the slack */
 typedef struct splat_queue { uint32_t count, at[BLOCK + VW], depth[BLOCK + VW]; } splat_queue;
@@ -24,26 +24,30 @@ static const uint16_t beyond_last[4][4] = {{65535, 65535, 65535, 65535}, {0, 0, 
 
 static void draw_small(const splat_queue* queue, uint16_t* work, uint32_t size)
 {
-    for (uint32_t i = 0; i < queue->count; i++) {
-        uint32_t at = queue->at[i], width = at >> 20;
-        uint16_t depth = (uint16_t)queue->depth[i];
-        uint16_t* p = work + (at & 0xfffffu);
-        vh4_store_min(p, vh4_set1_or(depth, beyond[width]));
-        vh4_store_min(p + size, vh4_set1_or(depth, beyond_last[width]));
+    for (uint32_t first = 0; first < VW; first++) {
+        for (uint32_t i = first; i < queue->count; i += VW) {
+            uint32_t at = queue->at[i], width = at >> 20;
+            uint16_t depth = (uint16_t)queue->depth[i];
+            uint16_t* p = work + (at & 0xfffffu);
+            vh4_store_min(p, vh4_set1_or(depth, beyond[width]));
+            vh4_store_min(p + size, vh4_set1_or(depth, beyond_last[width]));
+        }
     }
 }
 
 static void draw_large(const splat_queue* queue, uint16_t* work, uint32_t size)
 {
-    for (uint32_t i = 0; i < queue->count; i++) {
-        uint32_t at = queue->at[i], width = at >> 20;
-        uint16_t depth = (uint16_t)queue->depth[i];
-        uint16_t* p = work + (at & 0xfffffu);
-        vh4 row = vh4_set1_or(depth, beyond[width]);
-        vh4_store_min(p, row);
-        vh4_store_min(p + size, row);
-        vh4_store_min(p + 2 * size, row);
-        vh4_store_min(p + 3 * size, vh4_set1_or(depth, beyond_last[width]));
+    for (uint32_t first = 0; first < VW; first++) {
+        for (uint32_t i = first; i < queue->count; i += VW) {
+            uint32_t at = queue->at[i], width = at >> 20;
+            uint16_t depth = (uint16_t)queue->depth[i];
+            uint16_t* p = work + (at & 0xfffffu);
+            vh4 row = vh4_set1_or(depth, beyond[width]);
+            vh4_store_min(p, row);
+            vh4_store_min(p + size, row);
+            vh4_store_min(p + 2 * size, row);
+            vh4_store_min(p + 3 * size, vh4_set1_or(depth, beyond_last[width]));
+        }
     }
 }
 
@@ -61,16 +65,17 @@ void ES_KERNEL(es_splat_parabolic_map)(const es_parabolic_map* map, const es_poi
     const vi side_int = vi_set1((int32_t)map->size);
     splat_queue small, large;
 
-    for (uint32_t begin = 0; begin < points->count; begin += BLOCK) {
-        uint32_t end = points->count - begin < BLOCK ? points->count : begin + BLOCK;
+    const uint32_t vectors = (points->count + VW - 1) / VW, step = (vectors + STREAMS - 1) / STREAMS;
+    for (uint32_t begin = 0; begin < step; begin++) {
         small.count = large.count = 0;
-        for (uint32_t i = begin; i < end; i += VW) {
+        for (uint32_t vector = begin; vector < vectors; vector += step) {
+            const uint32_t i = vector * VW;
             vf dx = vf_load(points->x + i) - ox, dy = vf_load(points->y + i) - oy, dz = vf_load(points->z + i) - oz;
             vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz, qz = dx * nx + dy * ny + dz * nz;
             vf r2 = dx * dx + dy * dy + dz * dz;
             /* false for NaN and infinity, too */
             vm drawn = vm_gt(qz, vf_zero()) & vm_ge(r2, near2) & vm_lt(r2, far2);
-            if (end - i < VW) drawn &= vm_first((int32_t)(end - i));
+            if (points->count - i < VW) drawn &= vm_first((int32_t)(points->count - i));
             vf r = vf_sqrt(r2);
             vf s = vf_set1(1.0f) / (r + qz);
             vi width = vi_round(vf_clamp(width_scale * s, vf_set1(1.0f), vf_set1(4.0f)));
