@@ -87,7 +87,7 @@ void demo_draw_timings(demo_canvas* canvas, const es_renderer* renderer, double 
         if (pass->skipped)
             snprintf(line, sizeof line, "%-22s skipped: %s", pass->name, pass->skipped);
         else
-            snprintf(line, sizeof line, "%-22s %7.2f ms", pass->name, pass->milliseconds);
+            snprintf(line, sizeof line, "%-22s %7.2f ms         ", pass->name, pass->milliseconds);
         demo_draw_text(canvas, 4 * scale, y, scale, pass->skipped ? 0x909090 : 0xe0e8ff, line);
     }
 }
@@ -110,7 +110,7 @@ void demo_draw_help(demo_canvas* canvas)
     int scale = text_scale(canvas), count = (int)(sizeof lines / sizeof lines[0]);
     for (int i = 0; i < count; i++) {
         char line[64];
-        snprintf(line, sizeof line, "%-46s", lines[i]);
+        snprintf(line, sizeof line, "%-50s", lines[i]);
         demo_draw_text(canvas, 4 * scale, (int)canvas->height - (count - i) * 9 * scale - 3 * scale, scale, 0xffffff, line);
     }
 }
