@@ -8,7 +8,10 @@
  * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
  * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps.
  *
- * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [SCENE …], or frame_hashes --isas: the instruction sets at hand
+ * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
+ *        frame_hashes --isas
+ *   --write  also keeps every image as DIR/SCENE-FRAME-IMAGE.exr, to look at what changed
+ *   --isas   prints the instruction sets at hand
  */
 #include <earthshine/gi.h>
 
@@ -259,17 +262,20 @@ typedef struct plan {
 static const plan plans[] = {
     {"cornell", 0, 160, 120, 64, 4, 64, 1024, ES_TONE_MAP_REINHARD, false},
     {"room", 4000, 157, 119, 128, 8, 128, 1024, ES_TONE_MAP_PBR_NEUTRAL, false},
-    {"hall", 8000, 131, 97, 50, 3, 32, 500, ES_TONE_MAP_LINEAR, false},
+    {"hall", 8000, 131, 97, 50, 3, 32, 448, ES_TONE_MAP_LINEAR, false},
     {"parts", 0, 144, 96, 48, 2, 64, 1024, ES_TONE_MAP_REINHARD, true},
 };
 
-static void print_images(es_context* context, es_renderer* renderer, es_world* world, const char* scene, const char* frame)
+static void print_images(es_context* context, es_renderer* renderer, es_world* world, const char* scene, const char* frame, const char* folder)
 {
     check(context, es_renderer_render(renderer, world), "rendering");
     for (size_t i = 0; i < es_image_name_count(); i++) {
         es_image image = {0};
         check(context, es_renderer_image(renderer, es_image_name(i), &image), es_image_name(i));
         printf("%s %s %s %016" PRIx64 "\n", scene, frame, es_image_name(i), es_image_hash(&image));
+        char path[1024];
+        if (folder && snprintf(path, sizeof path, "%s/%s-%s-%s.exr", folder, scene, frame, es_image_name(i)) < (int)sizeof path)
+            check(context, es_image_save(context, &image, path, NULL), path);
         es_image_destroy(context, &image);
     }
 }
@@ -282,10 +288,9 @@ static void move_eye(es_context* context, es_world* world)
     check(context, es_world_get_node_transform(world, camera.node, &transform), "reading the camera's node");
     transform.translation.x += 0.0625f;
     check(context, es_world_set_node_transform(world, camera.node, &transform), "moving the camera");
-    check(context, es_world_step(world, 0), "a step of no time");
 }
 
-static void print_frames(es_context* context, const plan* p, bool skip)
+static void print_frames(es_context* context, const plan* p, bool skip, const char* folder)
 {
     es_world_settings world_settings = es_default_world_settings();
     world_settings.triangles = p->triangles;
@@ -316,26 +321,26 @@ static void print_frames(es_context* context, const plan* p, bool skip)
     es_renderer* renderer;
     check(context, es_renderer_create(context, &settings, &renderer), "creating a renderer");
 
-    print_images(context, renderer, world, p->name, "first");
+    print_images(context, renderer, world, p->name, "first", folder);
     check(context, es_world_step(world, 1.0f / 30), "a step");
-    print_images(context, renderer, world, p->name, "second");
+    print_images(context, renderer, world, p->name, "second", folder);
     check(context, es_world_step(world, 1.0f / 30), "a step");
-    print_images(context, renderer, world, p->name, "third");
+    print_images(context, renderer, world, p->name, "third", folder);
     check(context, es_world_step(world, 0), "a step of no time");
-    print_images(context, renderer, world, p->name, "still");
-    print_images(context, renderer, world, p->name, "unchanged");
+    print_images(context, renderer, world, p->name, "still", folder);
+    print_images(context, renderer, world, p->name, "unchanged", folder);
     move_eye(context, world);
-    print_images(context, renderer, world, p->name, "camera");
+    print_images(context, renderer, world, p->name, "camera", folder);
     settings.exposure += 0.5f;
     check(context, es_renderer_configure(renderer, &settings), "changing the exposure");
-    print_images(context, renderer, world, p->name, "exposure");
+    print_images(context, renderer, world, p->name, "exposure", folder);
     settings.seed += 1;
     check(context, es_renderer_configure(renderer, &settings), "changing the seed");
-    print_images(context, renderer, world, p->name, "seed");
+    print_images(context, renderer, world, p->name, "seed", folder);
     settings.method = ES_GI_CLASSIC;
     settings.vpls = 16;
     check(context, es_renderer_configure(renderer, &settings), "changing the method");
-    print_images(context, renderer, world, p->name, "classic");
+    print_images(context, renderer, world, p->name, "classic", folder);
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);
@@ -346,7 +351,7 @@ int main(int argc, char** argv)
 {
     es_context_desc desc = es_default_context_desc();
     bool skip = true;
-    const char* chosen[16];
+    const char *chosen[16], *folder = NULL;
     int chosen_count = 0;
     for (int i = 1; i < argc; i++) {
         es_isa isa;
@@ -361,10 +366,12 @@ int main(int argc, char** argv)
             i++;
         } else if (strcmp(argv[i], "--no-skip") == 0) {
             skip = false;
+        } else if (strcmp(argv[i], "--write") == 0 && i + 1 < argc) {
+            folder = argv[++i];
         } else if (argv[i][0] != '-' && chosen_count < 16) {
             chosen[chosen_count++] = argv[i];
         } else {
-            fprintf(stderr, "frame_hashes: %s: not understood; [--threads N] [--isa NAME] [--no-skip] [SCENE …] or --isas\n", argv[i]);
+            fprintf(stderr, "frame_hashes: %s: not understood; [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …] or --isas\n", argv[i]);
             return 2;
         }
     }
@@ -374,7 +381,7 @@ int main(int argc, char** argv)
     for (size_t i = 0; i < sizeof plans / sizeof *plans; i++) {
         bool wanted = chosen_count == 0;
         for (int k = 0; k < chosen_count; k++) wanted |= strcmp(chosen[k], plans[i].name) == 0;
-        if (wanted) print_frames(context, &plans[i], skip);
+        if (wanted) print_frames(context, &plans[i], skip, folder);
     }
     es_context_destroy(context);
     return fflush(stdout) == 0 && !ferror(stdout) ? 0 : 1;

@@ -43,4 +43,5 @@ awk '
         for (key in golden) if (!(key in seen)) print "NO LONGER MADE: " key
         for (scene in changed) print scene ": " changed[scene] " images changed"
     }' "$goldens" "$lines"
+echo "to see them: mkdir now && $build/frame_hashes --write now"
 exit 1
