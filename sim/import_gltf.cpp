@@ -17,13 +17,13 @@
 
 #include <tiny_gltf.h>
 
-#include "sim/world.h"
-
+/* these first: the headers below include them too, and they know nothing of C++ */
 extern "C" {
 #include "platform/context.h"
 #include "platform/maths.h"
 }
 #include "sim/gltf_file.h"
+#include "sim/world.h"
 
 namespace
 {
@@ -891,7 +891,11 @@ class importer
         if (const tinygltf::Value* emissive = extension(from.extensions, "KHR_materials_emissive_strength")) {
             strength = extension_number(*emissive, "emissiveStrength", 1.0, 0.0, 1e9, where + ".extensions.KHR_materials_emissive_strength");
         }
-        for (size_t c = 0; c < 3; c++) { desc.emission[c] = number(from.emissiveFactor[c], 0.0, 1.0, where + ".emissiveFactor") * strength; }
+        for (size_t c = 0; c < 3; c++) {
+            /* above 1 is against the standard, yet a common way to say what KHR_materials_emissive_strength is for */
+            float radiance = number(from.emissiveFactor[c], 0.0, 1e9, where + ".emissiveFactor") * strength;
+            desc.emission[c] = es_minf(radiance, ES_WORLD_EXTENT);
+        }
         desc.base_color_texture = texture_use(
             pbr.baseColorTexture.index, pbr.baseColorTexture.texCoord, pbr.baseColorTexture.extensions, true, pbr_where + ".baseColorTexture");
         if (from.alphaMode == "MASK") {
