@@ -41,8 +41,8 @@ static void tumbler_pose(float phase, es_vec3* translation, es_quat* rotation)
 
 static void spot_pose(float phase, es_vec3* translation, es_quat* rotation)
 {
-    *translation = es_v3(0.55f * es_sin(turn * phase), 1.72f, 2.05f);
-    es_vec3 target = es_v3(-0.35f * es_sin(turn * phase), 0.72f + 0.12f * es_cos(turn * phase), -0.75f);
+    *translation = es_v3(0.55f * es_sin(turn * phase), 1.82f, 2.05f);
+    es_vec3 target = es_v3(-0.35f * es_sin(turn * phase), 0.58f + 0.12f * es_cos(turn * phase), -0.75f);
     *rotation = es_look_rotation(es_v3_sub(target, *translation));
 }
 
@@ -108,9 +108,9 @@ es_result es_scene_cornell(es_world* world, uint32_t triangles)
         {add_cube(&builder, "block", es_v3(0.28f, 0.31f, 0.28f), white), block_pose},
         {add_cube(&builder, "cube", es_v3(0.23f, 0.23f, 0.23f), lacquer), cube_pose},
         {add_cube(&builder, "tumbler", es_v3(0.13f, 0.13f, 0.13f), ochre), tumbler_pose},
-        {es_build_spot(&builder, es_v3(0, 1.72f, 2.05f), es_v3(0, -1, -3), (const float[3]){1.0f, 0.96f, 0.88f}, 34.0f, 0.36f, 0.52f), spot_pose},
+        {es_build_spot(&builder, es_v3(0, 1.82f, 2.05f), es_v3(0, -1, -3), (const float[3]){1.0f, 0.96f, 0.88f}, 42.0f, 0.36f, 0.54f), spot_pose},
     };
-    es_build_camera(&builder, es_v3(0, 1.0f, 3.6f), es_v3(0, 0, -1), 0.76f, 0.1f);
+    es_build_camera(&builder, es_v3(0, 1.0f, 3.6f), es_v3(0, 0, -1), 0.74f, 0.1f);
     es_build_clip(&builder, "motion", PERIOD, KEYS, motions, sizeof motions / sizeof motions[0]);
     return builder.result;
 }

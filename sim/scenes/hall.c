@@ -16,7 +16,7 @@
 
 static const float turn = 6.2831853f;
 
-enum { BAYS = 8, PERIOD = 24, KEYS = 48, OWN_TRIANGLES = 93000, FLUTES = 20 };
+enum { BAYS = 8, PERIOD = 24, KEYS = 48, FIXED_TRIANGLES = 17000, SCALED_TRIANGLES = 91500, FLUTES = 20 };
 static const float bay = 3.2f, half_length = 12.8f, axis_x = 2.6f, aisle_x = 5.4f, wall = 0.4f;
 static const float aisle_ceiling = 6.0f, spring = 4.5f, arcade_top = 6.4f, vault_spring = 6.6f, vault_radius = 2.35f;
 static const float arch_radius = 1.2f, arcade_half = 0.3f;
@@ -421,15 +421,17 @@ static void add_far_end(es_scene_builder* builder, const detail* d, es_material 
 /* From high in the right aisle across the nave; the aim wanders along the hall and back. */
 static void spot_pose(float phase, es_vec3* translation, es_quat* rotation)
 {
-    *translation = es_v3(4.75f, 4.9f, 3.2f);
-    es_vec3 target = es_v3(-1.9f, 0.9f + 0.5f * es_cos(turn * phase), -1.2f + 2.8f * es_sin(turn * phase));
+    *translation = es_v3(4.9f, 5.0f, 9.0f);
+    es_vec3 target = es_v3(-2.4f, 1.1f + 0.4f * es_cos(turn * phase), 3.6f + 2.6f * es_sin(turn * phase));
     *rotation = es_look_rotation(es_v3_sub(target, *translation));
 }
 
 es_result es_scene_hall(es_world* world, uint32_t triangles)
 {
     es_scene_builder builder = {world, ES_OK};
-    detail d = {triangles ? es_sqrt((float)triangles / (float)OWN_TRIANGLES) : 1.0f};
+    /* boxes and slabs stay as they are; everything curved is scaled */
+    float scaled = es_maxf((float)triangles - (float)FIXED_TRIANGLES, 1000.0f);
+    detail d = {triangles ? es_sqrt(scaled / (float)SCALED_TRIANGLES) : 1.0f};
     es_material stone = es_build_lambert(&builder, "limestone", 0.70f, 0.64f, 0.54f);
     es_material plaster = es_build_lambert(&builder, "plaster", 0.78f, 0.73f, 0.64f);
     es_material dark = es_build_lambert(&builder, "mortar", 0.30f, 0.27f, 0.24f);
@@ -461,7 +463,7 @@ es_result es_scene_hall(es_world* world, uint32_t triangles)
     es_build_object(&builder, "rods", &rods, dark, es_v3(0, 0, 0));
 
     es_build_camera(&builder, es_v3(0.55f, 1.75f, 11.6f), es_v3(-0.09f, 0.13f, -1), 1.02f, 0.1f);
-    es_node spot = es_build_spot(&builder, es_v3(4.75f, 4.9f, 3.2f), es_v3(-1, -1, -1), (const float[3]){1.0f, 0.90f, 0.74f}, 900.0f, 0.44f, 0.58f);
+    es_node spot = es_build_spot(&builder, es_v3(4.9f, 5.0f, 9.0f), es_v3(-1, -1, -1), (const float[3]){1.0f, 0.90f, 0.74f}, 1200.0f, 0.30f, 0.48f);
     es_build_clip(&builder, "light", PERIOD, KEYS, &(es_motion){spot, spot_pose}, 1);
     return builder.result;
 }
