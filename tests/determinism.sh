@@ -58,7 +58,7 @@ configure_and_build()
         "$@" >"$folder.log" 2>&1 || ! cmake --build "$folder" --target frame_hashes >>"$folder.log" 2>&1; then
         compared=$((compared + 1))
         different=$((different + 1))
-        echo "FAILED: the build in $folder: $(grep -m 1 -iE 'error' "$folder.log" || tail -n 1 "$folder.log")"
+        echo "FAILED: the build in $folder: $(grep -m 1 -E 'error:|undefined reference|CMake Error' "$folder.log" || tail -n 1 "$folder.log")"
         return 1
     fi
 }
