@@ -80,7 +80,9 @@ static inline void es_surface_parts(const es_surface* s, es_vec3 n, es_vec3 wi, 
     float a = 1.0f - nl, b = 1.0f - nv;
     float a2 = a * a, b2 = b * b;
     *pass = (1.0f - f90 * (0.04f + 0.96f * (a2 * a2 * a))) * (1.0f - f90 * (0.04f + 0.96f * (b2 * b2 * b)));
-    float h = es_sqrt(es_maxf(2.0f + 2.0f * c, 1e-12f)); /* |wi + wo| */
+    /* by its components: 2 + 2 wi·wo cancels where both directions graze the surface */
+    es_vec3 half = es_v3_add(wi, wo);
+    float h = es_sqrt(es_maxf(es_v3_dot(half, half), 1e-12f));
     float nh = es_minf((nl + nv) / h, 1.0f), m = es_maxf(1.0f - 0.5f * h, 0.0f);
     float alpha = s->roughness * s->roughness, alpha2 = es_maxf(alpha * alpha, ES_SURFACE_MIN_ALPHA2), rest = 1.0f - alpha2;
     float d = 1.0f - nh * nh * rest;

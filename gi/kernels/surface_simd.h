@@ -41,7 +41,8 @@ VINL void es_surface_parts_v(const es_surface_v* s, vf nx, vf ny, vf nz, vf ix, 
     vf a = one - nl, b = one - nv;
     vf a2 = a * a, b2 = b * b;
     *pass = (one - f90 * (vf_set1(0.04f) + vf_set1(0.96f) * (a2 * a2 * a))) * (one - f90 * (vf_set1(0.04f) + vf_set1(0.96f) * (b2 * b2 * b)));
-    vf h = vf_sqrt(vf_max(vf_set1(2.0f) + vf_set1(2.0f) * c, vf_set1(1e-12f)));
+    vf hx = ix + ox, hy = iy + oy, hz = iz + oz;
+    vf h = vf_sqrt(vf_max(hx * hx + hy * hy + hz * hz, vf_set1(1e-12f)));
     vf nh = vf_min((nl + nv) / h, one), m = vf_max(one - vf_set1(0.5f) * h, zero);
     vf alpha = s->roughness * s->roughness, alpha2 = vf_max(alpha * alpha, vf_set1(ES_SURFACE_MIN_ALPHA2)), rest = one - alpha2;
     vf d = one - nh * nh * rest;
