@@ -21,7 +21,7 @@ static void knot_pose(float phase, es_vec3* translation, es_quat* rotation)
 /* The block below it rocks about the vertical; half its diagonal is 0.40 m. */
 static void block_pose(float phase, es_vec3* translation, es_quat* rotation)
 {
-    *translation = es_v3(-0.42f, 0.31f, -0.38f);
+    *translation = es_v3(-0.42f, 0.311f, -0.38f);
     *rotation = es_quat_from_axis_angle(es_v3(0, 1, 0), 0.3f + 0.5f * es_sin(turn * phase));
 }
 
