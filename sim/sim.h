@@ -106,6 +106,8 @@ ES_API const es_raster_mesh* es_world_mesh(const es_world* world, es_mesh mesh);
 
 typedef struct es_transform { es_vec3 translation; es_quat rotation; es_vec3 scale; } es_transform;
 ES_API es_transform es_identity_transform(void);
+/* Where a transform is set, an all-zero rotation counts as the identity, and with it an all-zero scale as 1: a zero-initialised
+ * transform is the identity, and a scale of zero that is meant comes with a rotation. Rotations are made unit. */
 
 typedef struct es_node_desc { const char* name; es_node parent; es_transform transform; } es_node_desc;
 ES_API es_result es_world_add_node(es_world* world, const es_node_desc* desc, es_node* node);
@@ -114,6 +116,7 @@ ES_API es_result es_world_get_node_transform(const es_world* world, es_node node
 ES_API es_result es_world_get_node_matrix(const es_world* world, es_node node, es_mat4* to_world);
 ES_API es_node es_world_find_node(const es_world* world, const char* name);
 
+/* A null node stands for the world's own axes (here, for cameras and for lights), a null material for the default one. */
 typedef struct es_instance_desc { es_node node; es_mesh mesh; es_material material; bool hidden; } es_instance_desc;
 ES_API es_result es_world_add_instance(es_world* world, const es_instance_desc* desc, es_instance* instance);
 ES_API es_result es_world_set_instance(es_world* world, es_instance instance, const es_instance_desc* desc);
@@ -133,7 +136,7 @@ ES_API es_camera_desc es_default_camera_desc(void);
 ES_API es_result es_world_add_camera(es_world* world, const es_camera_desc* desc, es_camera* camera);
 ES_API es_result es_world_set_camera(es_world* world, es_camera camera, const es_camera_desc* desc);
 ES_API es_result es_world_get_camera(const es_world* world, es_camera camera, es_camera_desc* desc);
-/* The camera that es_renderer_render looks through; null when the world has none. */
+/* The camera that es_renderer_render looks through: the first one added, until another is set; null when the world has none. */
 ES_API es_camera es_world_active_camera(const es_world* world);
 ES_API es_result es_world_set_active_camera(es_world* world, es_camera camera);
 /* This frame's and last frame's view of a camera, for drawing. */
@@ -168,7 +171,7 @@ typedef struct es_clip_channel {
     const float* values;      /* 3 or 4 per key; cubic spline: in-tangent, value, out-tangent per key */
 } es_clip_channel;
 typedef struct es_clip_desc { const char* name; uint32_t channel_count; const es_clip_channel* channels; } es_clip_desc;
-/* Copied. Clips loop over their duration. */
+/* Copied, and not played before es_world_play_clip says so (opening a scene or file does, by the settings). Clips loop over their duration. */
 ES_API es_result es_world_add_clip(es_world* world, const es_clip_desc* desc, es_clip* clip);
 ES_API es_result es_world_play_clip(es_world* world, es_clip clip, bool play);
 

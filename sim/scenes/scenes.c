@@ -8,7 +8,7 @@
 static const es_scene scenes[] = {
     {"cornell", "a Cornell box with four moving objects under a moving spot light (3,372 triangles)", es_scene_cornell},
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
-    {"hall", "a colonnade that a light from the side aisle reaches mostly by way of its walls", es_scene_hall},
+    {"hall", "a colonnade lit from its side aisle, for the most part by what the walls give back (108,516 triangles)", es_scene_hall},
 };
 
 size_t es_scene_count(void) { return sizeof scenes / sizeof scenes[0]; }
