@@ -20,7 +20,16 @@
 #include "platform/simd.h"
 
 typedef struct v3 { vf x, y, z; } v3;
-typedef struct pixel8 { vi normal, geometric_normal, albedo_rg, albedo_b, surface, emission, instance, triangle; vf depth, motion_x, motion_y; } pixel8;
+/* Where a group's results go: pixel `at` of the planes. Lanes of `mask` are written; the others become zero for the group's first
+ * instance and keep what an earlier one wrote otherwise. */
+typedef struct target { const es_gbuffer* planes; size_t at; vm mask; bool first; } target;
+
+VINL void put(const target* t, uint32_t* plane, vi value)
+{
+    vi old = t->first ? vi_zero() : vi_load(plane + t->at);
+    vi_store(plane + t->at, vi_select(t->mask, value, old));
+}
+VINL void put_float(const target* t, float* plane, vf value) { put(t, (uint32_t*)plane, vi_from_bits(value)); }
 
 VINL vf dot(v3 a, v3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 VINL v3 cross(v3 a, v3 b) { return (v3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
@@ -46,16 +55,34 @@ typedef struct surface8 {
     const es_prepared_instance* instance;
     vm active, back;             /* back: seen from the side where the winding is clockwise */
     vi index[3];
+    uint32_t offset[3][VW];      /* of the vertices in a stream, bytes: kept in memory, from where loads take them */
     vf w[3], lambda[3];
     vf bx[3], by[3], sum_x, sum_y, inverse;
 } surface8;
 
+VINL void gather_vertex(const void* stream, const uint32_t offset[VW], vf* a, vf* b, vf* c, vf* d)
+{
+    const char* p = stream;
+#if defined(ES_SIMD_256)
+#define ES_LOAD_PAIR_(i, j) _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps((const float*)(p + offset[i]))), _mm_loadu_ps((const float*)(p + offset[j])), 1)
+    __m256 r0 = ES_LOAD_PAIR_(0, 4), r1 = ES_LOAD_PAIR_(1, 5), r2 = ES_LOAD_PAIR_(2, 6), r3 = ES_LOAD_PAIR_(3, 7);
+#undef ES_LOAD_PAIR_
+    __m256 t0 = _mm256_unpacklo_ps(r0, r1), t1 = _mm256_unpackhi_ps(r0, r1), t2 = _mm256_unpacklo_ps(r2, r3), t3 = _mm256_unpackhi_ps(r2, r3);
+    *a = (vf)_mm256_shuffle_ps(t0, t2, 0x44);
+    *b = (vf)_mm256_shuffle_ps(t0, t2, 0xee);
+    *c = (vf)_mm256_shuffle_ps(t1, t3, 0x44);
+    *d = (vf)_mm256_shuffle_ps(t1, t3, 0xee);
+#else
+    vf_gather4(p, 1, vi_load(offset), a, b, c, d);
+#endif
+}
+
 VINL v3 interpolate3(const surface8* s, const float* stream, vf* fourth)
 {
     vf a[4], b[4], c[4];
-    vf_gather4(stream, 16, s->index[0], &a[0], &a[1], &a[2], &a[3]);
-    vf_gather4(stream, 16, s->index[1], &b[0], &b[1], &b[2], &b[3]);
-    vf_gather4(stream, 16, s->index[2], &c[0], &c[1], &c[2], &c[3]);
+    gather_vertex(stream, s->offset[0], &a[0], &a[1], &a[2], &a[3]);
+    gather_vertex(stream, s->offset[1], &b[0], &b[1], &b[2], &b[3]);
+    gather_vertex(stream, s->offset[2], &c[0], &c[1], &c[2], &c[3]);
     if (fourth) *fourth = a[3] * s->lambda[0] + b[3] * s->lambda[1] + c[3] * s->lambda[2];
     return (v3){a[0] * s->lambda[0] + b[0] * s->lambda[1] + c[0] * s->lambda[2], a[1] * s->lambda[0] + b[1] * s->lambda[1] + c[1] * s->lambda[2],
         a[2] * s->lambda[0] + b[2] * s->lambda[1] + c[2] * s->lambda[2]};
@@ -141,7 +168,7 @@ static v3 map_normal(const surface8* s, v3 normal, const es_rgba* texel)
 }
 
 /* The planes that textures change. Out of line: most pixels of untextured scenes never come here. */
-static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32_t planes, v3* normal, v3 geometric, es_rgba* color, pixel8* out)
+static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32_t planes, v3* normal, v3 geometric, es_rgba* color, vi* surface, vi* emission)
 {
     const es_prepared_material* material = s->instance->material;
     const es_prepared_texture* textures = material->textures;
@@ -172,32 +199,36 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
         }
         if (textures[ES_TEXTURE_SPECULAR].image) specular = specular * ES_SAMPLE_(ES_TEXTURE_SPECULAR).a;
         vi second = material->model == ES_SURFACE_PHONG ? vi_set1((int32_t)(material->surface_word >> 8 & 0xff)) : es_pack_unorm8_v(roughness);
-        out->surface = es_pack_unorm8_v(metallic) | (second << 8) | (es_pack_unorm8_v(specular) << 16) | vi_set1((int32_t)(material->model << 24));
+        *surface = es_pack_unorm8_v(metallic) | (second << 8) | (es_pack_unorm8_v(specular) << 16) | vi_set1((int32_t)(material->model << 24));
     }
     if ((planes & ES_GBUFFER_EMISSION) && textures[ES_TEXTURE_EMISSION].image) {
         es_rgba texel = ES_SAMPLE_(ES_TEXTURE_EMISSION);
-        out->emission = es_pack_rgb9e5_v(vf_set1(material->emission[0]) * texel.r, vf_set1(material->emission[1]) * texel.g, vf_set1(material->emission[2]) * texel.b);
+        *emission = es_pack_rgb9e5_v(vf_set1(material->emission[0]) * texel.r, vf_set1(material->emission[1]) * texel.g, vf_set1(material->emission[2]) * texel.b);
     }
 #undef ES_SAMPLE_
 }
 
-VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance* instance, vm active, vi id, vf x, vf y, pixel8* out)
+VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance* instance, const target* t, vi id, vf x, vf y)
 {
     const es_raster_mesh* mesh = instance->mesh;
     const es_prepared_material* material = instance->material;
     const uint32_t planes = job->gbuffer.planes;
     surface8 s; /* not initialised as a whole: clearing it cost more than the interpolation */
     s.instance = instance;
-    s.active = active;
+    const vm active = s.active = t->mask;
+    const es_gbuffer* planes_of = t->planes;
 
     vi triangle = active & (id - vi_set1((int32_t)instance->first_id)), unused;
-    out->triangle = triangle + vi_set1(1);
-    out->instance = vi_set1((int32_t)(instance->instance_id + 1));
+    if (planes & ES_GBUFFER_TRIANGLE) put(t, planes_of->triangle, triangle + vi_set1(1));
+    if (planes & ES_GBUFFER_INSTANCE) put(t, planes_of->instance, vi_set1((int32_t)(instance->instance_id + 1)));
     vi_gather4(mesh->indices, 12, triangle, &s.index[0], &s.index[1], &s.index[2], &unused);
 
     vf xr[3], yr[3], z[3], b[3];
     for (int k = 0; k < 3; k++) {
-        vf_gather4(job->vertices + instance->first_vertex, 16, s.index[k], &xr[k], &yr[k], &z[k], &s.w[k]);
+        vi_store(s.offset[k], s.index[k] << 4);
+        /* or the compiler moves every offset out of a vector register, at twice the instructions of loading it */
+        __asm__ volatile("" : : "r"(s.offset[k]) : "memory");
+        gather_vertex(job->vertices + instance->first_vertex, s.offset[k], &xr[k], &yr[k], &z[k], &s.w[k]);
         xr[k] = xr[k] - x * s.w[k];
         yr[k] = yr[k] - y * s.w[k];
     }
@@ -223,7 +254,7 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
     vf w = s.lambda[0] * s.w[0] + s.lambda[1] * s.w[1] + s.lambda[2] * s.w[2];
     vf depth_z = s.lambda[0] * z[0] + s.lambda[1] * z[1] + s.lambda[2] * z[2];
     vf distance = job->orthographic ? vf_set1(job->distance_offset) + vf_set1(job->distance_scale) * depth_z : w;
-    out->depth = vf_max(distance, vf_set1(1e-30f)); /* zero would say that nothing is seen */
+    if (planes & ES_GBUFFER_DEPTH) put_float(t, planes_of->depth, vf_max(distance, vf_set1(1e-30f))); /* zero would say that nothing is seen */
 
     bool gradients = (planes & (ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL)) || material->any_texture;
     v3 geometric = {zero, zero, zero};
@@ -255,7 +286,7 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
         const float* eye = job->orthographic ? job->row_z : job->row_w;
         v3 fallback = {vf_set1(eye[0]) * toward, vf_set1(eye[1]) * toward, vf_set1(eye[2]) * toward};
         geometric = select3(directed(geometric), geometric, fallback);
-        if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) out->geometric_normal = es_pack_normal_v(geometric.x, geometric.y, geometric.z);
+        if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) put(t, planes_of->geometric_normal, es_pack_normal_v(geometric.x, geometric.y, geometric.z));
     }
 
     v3 normal = geometric;
@@ -275,27 +306,29 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
         color.g = color.g * c.y;
         color.b = color.b * c.z;
     }
-    out->surface = vi_set1((int32_t)material->surface_word);
-    out->emission = vi_set1((int32_t)material->emission_word);
-    if (material->any_texture) resolve_textures(&s, planes, &normal, geometric, &color, out);
+    vi surface = vi_set1((int32_t)material->surface_word), emission = vi_set1((int32_t)material->emission_word);
+    if (material->any_texture) resolve_textures(&s, planes, &normal, geometric, &color, &surface, &emission);
+    if (planes & ES_GBUFFER_SURFACE) put(t, planes_of->surface, surface);
+    if (planes & ES_GBUFFER_EMISSION) put(t, planes_of->emission, emission);
 
     if (planes & ES_GBUFFER_NORMAL) {
         if (own_normals || material->any_texture) {
             vi flip = s.back & vi_set1(INT32_MIN);
             v3 turned = {vf_from_bits(vi_from_bits(normal.x) ^ flip), vf_from_bits(vi_from_bits(normal.y) ^ flip), vf_from_bits(vi_from_bits(normal.z) ^ flip)};
             normal = select3(directed(turned), turned, geometric);
-            out->normal = es_pack_normal_v(normal.x, normal.y, normal.z);
+            put(t, planes_of->normal, es_pack_normal_v(normal.x, normal.y, normal.z));
         } else {
-            out->normal = es_pack_normal_v(geometric.x, geometric.y, geometric.z);
+            put(t, planes_of->normal, es_pack_normal_v(geometric.x, geometric.y, geometric.z));
         }
     }
     if (planes & ES_GBUFFER_ALBEDO) {
-        out->albedo_rg = es_pack_unorm16_v(color.r) | (es_pack_unorm16_v(color.g) << 16);
-        out->albedo_b = es_pack_unorm16_v(color.b) | vi_set1((int32_t)(instance->material_index << 16));
+        put(t, planes_of->albedo_rg, es_pack_unorm16_v(color.r) | (es_pack_unorm16_v(color.g) << 16));
+        put(t, planes_of->albedo_b, es_pack_unorm16_v(color.b) | vi_set1((int32_t)(instance->material_index << 16)));
     }
 
-    out->motion_x = out->motion_y = zero;
-    if ((planes & ES_GBUFFER_MOTION) && (instance->moving || instance->has_deltas)) {
+    if (!(planes & ES_GBUFFER_MOTION)) return;
+    vf motion_x = zero, motion_y = zero;
+    if (instance->moving || instance->has_deltas) {
         /* change of the homogeneous window position since last frame, so that what stands still has motion zero exactly:
          * X - (X w + dx) / (w + dw) = (X dw - dx) / (w + dw) */
         vf dx, dy, dw;
@@ -315,31 +348,21 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
         vf inverse_then = vf_set1(1.0f) / vf_select(before, then, vf_set1(1.0f));
         vf away = vf_set1(ES_MOTION_BEHIND);
         vf mx = vf_clamp((x * dw - dx) * inverse_then, vf_neg(away), away), my = vf_clamp((y * dw - dy) * inverse_then, vf_neg(away), away);
-        out->motion_x = vf_select(before, mx, away);
-        out->motion_y = vf_select(before, my, away);
+        motion_x = vf_select(before, mx, away);
+        motion_y = vf_select(before, my, away);
     }
+    put_float(t, planes_of->motion_x, motion_x);
+    put_float(t, planes_of->motion_y, motion_y);
 }
 
-VINL pixel8 nothing(void)
+static void clear_pixels(const es_gbuffer* g, size_t at)
 {
-    vi i = vi_zero();
-    vf f = vf_zero();
-    return (pixel8){i, i, i, i, i, i, i, i, f, f, f};
-}
-
-VINL void merge(vm m, pixel8* to, const pixel8* from)
-{
-    to->normal = vi_select(m, from->normal, to->normal);
-    to->geometric_normal = vi_select(m, from->geometric_normal, to->geometric_normal);
-    to->albedo_rg = vi_select(m, from->albedo_rg, to->albedo_rg);
-    to->albedo_b = vi_select(m, from->albedo_b, to->albedo_b);
-    to->surface = vi_select(m, from->surface, to->surface);
-    to->emission = vi_select(m, from->emission, to->emission);
-    to->instance = vi_select(m, from->instance, to->instance);
-    to->triangle = vi_select(m, from->triangle, to->triangle);
-    to->depth = vf_select(m, from->depth, to->depth);
-    to->motion_x = vf_select(m, from->motion_x, to->motion_x);
-    to->motion_y = vf_select(m, from->motion_y, to->motion_y);
+    float* const floats[] = {g->depth, g->motion_x, g->motion_y};
+    uint32_t* const words[] = {g->normal, g->geometric_normal, g->albedo_rg, g->albedo_b, g->surface, g->emission, g->instance, g->triangle};
+    for (size_t i = 0; i < sizeof floats / sizeof *floats; i++)
+        if (floats[i]) vf_store(floats[i] + at, vf_zero());
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (words[i]) vi_store(words[i] + at, vi_zero());
 }
 
 void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
@@ -347,6 +370,7 @@ void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
     const es_gbuffer* g = &job->gbuffer;
     const uint32_t columns = g->width - (uint32_t)tile->x < ES_TILE_SIZE ? g->width - (uint32_t)tile->x : ES_TILE_SIZE;
     const uint32_t rows = g->height - (uint32_t)tile->y < ES_TILE_SIZE ? g->height - (uint32_t)tile->y : ES_TILE_SIZE;
+    uint64_t pixels = 0;
     for (uint32_t row = 0; row < rows; row++) {
         size_t line = (size_t)((uint32_t)tile->y + row) * g->stride + (uint32_t)tile->x;
         vf y = vf_set1((float)(tile->y + (int32_t)row) + 0.5f - 0.5f * (float)tile->height);
@@ -354,35 +378,21 @@ void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
             uint32_t at = row * ES_TILE_PITCH + column;
             vm seen = vm_gt(vf_load(tile->depth + at), vf_zero()) & vm_first((int32_t)(columns - column));
             uint32_t pending = vm_bits(seen);
-            job->pixels += (uint32_t)__builtin_popcount(pending);
-            pixel8 out = nothing();
-            if (pending) {
-                vi id = seen & vi_load(tile->id + at);
-                vf x = vf_set1((float)(tile->x + (int32_t)column) + 0.5f - 0.5f * (float)tile->width) + vf_iota();
-                vi instance = vi_gather(job->chunk_instance, vi_shift_right_logical(id, ES_CHUNK_BITS));
-                while (pending) {
-                    int32_t which = instance[__builtin_ctz(pending)];
-                    vm active = seen & vi_eq(instance, vi_set1(which));
-                    pixel8 part = nothing();
-                    resolve_instance(job, &job->instances[which], active, id, x, y, &part);
-                    merge(active, &out, &part);
-                    pending &= ~vm_bits(active);
-                }
+            if (!pending) {
+                clear_pixels(g, line + column);
+                continue;
             }
-            size_t p = line + column;
-            if (g->depth) vf_store(g->depth + p, out.depth);
-            if (g->normal) vi_store(g->normal + p, out.normal);
-            if (g->geometric_normal) vi_store(g->geometric_normal + p, out.geometric_normal);
-            if (g->albedo_rg) vi_store(g->albedo_rg + p, out.albedo_rg);
-            if (g->albedo_b) vi_store(g->albedo_b + p, out.albedo_b);
-            if (g->surface) vi_store(g->surface + p, out.surface);
-            if (g->emission) vi_store(g->emission + p, out.emission);
-            if (g->motion_x) {
-                vf_store(g->motion_x + p, out.motion_x);
-                vf_store(g->motion_y + p, out.motion_y);
+            pixels += (uint32_t)__builtin_popcount(pending);
+            vi id = seen & vi_load(tile->id + at);
+            vf x = vf_set1((float)(tile->x + (int32_t)column) + 0.5f - 0.5f * (float)tile->width) + vf_iota();
+            vi instance = vi_gather(job->chunk_instance, vi_shift_right_logical(id, ES_CHUNK_BITS));
+            for (bool first = true; pending; first = false) {
+                int32_t which = instance[__builtin_ctz(pending)];
+                target t = {g, line + column, seen & vi_eq(instance, vi_set1(which)), first};
+                resolve_instance(job, &job->instances[which], &t, id, x, y);
+                pending &= ~vm_bits(t.mask);
             }
-            if (g->instance) vi_store(g->instance + p, out.instance);
-            if (g->triangle) vi_store(g->triangle + p, out.triangle);
         }
     }
+    job->pixels += pixels;
 }
