@@ -775,24 +775,33 @@ class importer
         return found != extensions.end() && found->second.IsObject() ? &found->second : nullptr;
     }
 
+    /* Not Value::Get(name): that one keeps a static object for what is absent. */
+    static const tinygltf::Value* member(const tinygltf::Value& object, const char* name)
+    {
+        if (!object.IsObject()) { return nullptr; }
+        const tinygltf::Value::Object& members = object.Get<tinygltf::Value::Object>();
+        auto found = members.find(name);
+        return found == members.end() ? nullptr : &found->second;
+    }
+
     /* A number of an extension; `standard` when it is absent. */
     float extension_number(const tinygltf::Value& object, const char* name, double standard, double low, double high, const std::string& where)
     {
-        if (!object.Has(name)) { return static_cast<float>(standard); }
-        const tinygltf::Value& value = object.Get(name);
-        if (!value.IsNumber()) { refuse(ES_FILE_DAMAGED, "%s.%s: must be a number", where.c_str(), name); }
-        return number(value.GetNumberAsDouble(), low, high, where + "." + name);
+        const tinygltf::Value* value = member(object, name);
+        if (!value) { return static_cast<float>(standard); }
+        if (!value->IsNumber()) { refuse(ES_FILE_DAMAGED, "%s.%s: must be a number", where.c_str(), name); }
+        return number(value->GetNumberAsDouble(), low, high, where + "." + name);
     }
 
     void extension_numbers(const tinygltf::Value& object, const char* name, size_t count, double low, double high, const std::string& where, float* out)
     {
-        if (!object.Has(name)) { return; }
-        const tinygltf::Value& value = object.Get(name);
-        if (!value.IsArray() || value.ArrayLen() != count) {
+        const tinygltf::Value* value = member(object, name);
+        if (!value) { return; }
+        if (!value->IsArray() || value->ArrayLen() != count) {
             refuse(ES_FILE_DAMAGED, "%s.%s: must be an array of %zu numbers", where.c_str(), name, count);
         }
         for (size_t i = 0; i < count; i++) {
-            const tinygltf::Value& element = value.Get(i);
+            const tinygltf::Value& element = value->Get<tinygltf::Value::Array>()[i];
             if (!element.IsNumber()) { refuse(ES_FILE_DAMAGED, "%s.%s[%zu]: must be a number", where.c_str(), name, i); }
             out[i] = number(element.GetNumberAsDouble(), low, high, where + "." + name);
         }
@@ -932,17 +941,17 @@ class importer
         if (color[0] == 1 && color[1] == 1 && color[2] == 1) { luminance = 1; }
         desc.specular = es_clampf(factor * luminance, 0, 1);
         if (color[0] != color[1] || color[1] != color[2] || factor * luminance > 1) { left.tinted_specular++; }
-        if (specular.Has("specularColorTexture")) { left.specular_textures++; }
-        if (!specular.Has("specularTexture") || !specular.Get("specularTexture").IsObject()) { return; }
-        const tinygltf::Value& info = specular.Get("specularTexture");
+        if (member(specular, "specularColorTexture")) { left.specular_textures++; }
+        const tinygltf::Value* info = member(specular, "specularTexture");
+        if (!info || !info->IsObject()) { return; }
         std::string place = where + ".specularTexture";
-        if (!info.Has("index")) { refuse(ES_FILE_DAMAGED, "%s.index: is absent", place.c_str()); }
-        int texture = static_cast<int>(extension_number(info, "index", 0.0, 0.0, 1e9, place));
-        int tex_coord = static_cast<int>(extension_number(info, "texCoord", 0.0, 0.0, 1024.0, place));
+        if (!member(*info, "index")) { refuse(ES_FILE_DAMAGED, "%s.index: is absent", place.c_str()); }
+        int texture = static_cast<int>(extension_number(*info, "index", 0.0, 0.0, 1e9, place));
+        int tex_coord = static_cast<int>(extension_number(*info, "texCoord", 0.0, 0.0, 1024.0, place));
         tinygltf::ExtensionMap extensions;
-        if (info.Has("extensions") && info.Get("extensions").IsObject() && info.Get("extensions").Has("KHR_texture_transform")) {
-            extensions["KHR_texture_transform"] = info.Get("extensions").Get("KHR_texture_transform");
-        }
+        const tinygltf::Value* all = member(*info, "extensions");
+        const tinygltf::Value* transform = all ? member(*all, "KHR_texture_transform") : nullptr;
+        if (transform) { extensions["KHR_texture_transform"] = *transform; }
         desc.specular_texture = texture_use(texture, tex_coord, extensions, false, place);
     }
 
@@ -1273,8 +1282,9 @@ class importer
             const tinygltf::Value* use = extension(model.nodes[n].extensions, "KHR_lights_punctual");
             if (!use) { continue; }
             std::string where = at("nodes", n) + ".extensions.KHR_lights_punctual";
-            if (!use->Has("light") || !use->Get("light").IsInt()) { refuse(ES_FILE_DAMAGED, "%s.light: must be a whole number", where.c_str()); }
-            add_light(index(use->Get("light").GetNumberAsInt(), model.lights.size(), where + ".light"), nodes[n]);
+            const tinygltf::Value* light = member(*use, "light");
+            if (!light || !light->IsInt()) { refuse(ES_FILE_DAMAGED, "%s.light: must be a whole number", where.c_str()); }
+            add_light(index(light->GetNumberAsInt(), model.lights.size(), where + ".light"), nodes[n]);
             count++;
         }
         if (count == 0) { needs_light = settings.default_light; }
