@@ -50,8 +50,8 @@ typedef struct es_shade_light {
     bool glossy;
 } es_shade_light;
 
-/* Pixels of one phase inside a block of the image: enough to pay for loading a light, few enough for the first-level cache.
- * Rows of `columns` lanes, a multiple of eight. */
+/* Pixels of one phase inside a block of the image: so many that a light's map comes from memory few times a frame, so few that they
+ * and two maps fit the second-level cache. Rows of up to ES_SHADE_COLUMNS lanes, a multiple of eight. */
 enum { ES_SHADE_LANES = 4096, ES_SHADE_COLUMNS = 128 };
 
 typedef struct es_shade_batch {
