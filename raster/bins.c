@@ -99,5 +99,16 @@ bool es_order_segments(es_rasterizer* rasterizer)
             rasterizer->segments[first[segment->key + 1]++] = *segment;
             rasterizer->segment_pairs += segment->count;
         }
+    uint64_t most = 0;
+    for (size_t tile = 0; tile < keys / ES_RECORD_KINDS; tile++) {
+        uint64_t records = 0;
+        for (uint32_t i = first[tile * ES_RECORD_KINDS]; i < first[(tile + 1) * ES_RECORD_KINDS]; i++) records += rasterizer->segments[i].count;
+        if (records > most) most = records;
+    }
+    if (most > INT32_MAX - 16) {
+        es_fail(context, ES_INVALID_ARGUMENT, "%llu triangles meet in one tile of 64 x 64 pixels; fewer than 2^31 are supported", (unsigned long long)most);
+        return false;
+    }
+    rasterizer->tile_records_max = (uint32_t)most;
     return true;
 }

@@ -154,6 +154,10 @@ bool es_prepare_instances(es_rasterizer* rasterizer, const es_draw_list* list, c
             rasterizer->instances_culled++;
             continue;
         }
+        if (mesh->vertex_count > 1u << 27) {
+            es_fail(context, ES_INVALID_ARGUMENT, "instance %u of the draw list: its mesh has %u vertices; 2^27 are supported", i, mesh->vertex_count);
+            return false;
+        }
         uint64_t chunks = ((uint64_t)mesh->triangle_count + ES_CHUNK_TRIANGLES - 1) >> ES_CHUNK_BITS;
         if (rasterizer->chunk_count + chunks > ES_CHUNKS_MAX || rasterizer->vertex_count + mesh->vertex_count > UINT32_MAX - VERTEX_BLOCK) {
             es_fail(context, ES_INVALID_ARGUMENT, "instance %u of the draw list: a view holds at most 2^32 triangles and 2^32 vertices", i);

@@ -35,6 +35,8 @@ enum {
     ES_TILE_SIZE = 1 << ES_TILE_BITS,
     ES_TILE_PITCH = ES_TILE_SIZE + 8,          /* a row of eight lanes may begin in the last column: what it writes past the tile is not read */
     ES_TILE_WORDS = ES_TILE_PITCH * ES_TILE_SIZE,
+    ES_TILE_FRONT = 16,                        /* words readable before a tile's numbers */
+    ES_TILE_VISIBLE_MAX = ES_TILE_SIZE * ES_TILE_SIZE + 8, /* as many triangles as pixels, slot 0 for none, eight at a time */
 
     ES_SMALL_WIDTH = 8 * ES_SUBPIXELS,         /* extents up to which a triangle is drawn row by row, one vector each */
     ES_SMALL_HEIGHT = 64 * ES_SUBPIXELS,

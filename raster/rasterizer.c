@@ -14,7 +14,12 @@ static void free_worker(es_context* context, es_raster_worker* w)
     es_release(context, w->key_count, sizeof *w->key_count * w->key_capacity);
     es_release(context, w->touched, sizeof *w->touched * w->key_capacity);
     es_release(context, w->tile_depth, sizeof *w->tile_depth * (ES_TILE_WORDS + 8));
-    es_release(context, w->tile_id, sizeof *w->tile_id * (ES_TILE_WORDS + 8));
+    es_release(context, w->tile_number, sizeof *w->tile_number * (ES_TILE_FRONT + ES_TILE_WORDS + 8));
+    es_release(context, w->visible, sizeof *w->visible * ES_TILE_VISIBLE_MAX);
+    es_release(context, w->slot_number, sizeof *w->slot_number * ES_TILE_VISIBLE_MAX);
+    es_release(context, w->slot_pixel, sizeof *w->slot_pixel * ES_TILE_VISIBLE_MAX);
+    es_release(context, w->triangle_ids, sizeof *w->triangle_ids * w->number_capacity);
+    es_release(context, w->slot, sizeof *w->slot * w->number_capacity);
 }
 
 es_result es_rasterizer_create(es_context* context, es_rasterizer** rasterizer)
@@ -36,7 +41,10 @@ es_result es_rasterizer_create(es_context* context, es_rasterizer** rasterizer)
                (w->small_rects = es_allocate_array(context, ES_CHUNK_TRIANGLES, sizeof *w->small_rects)) &&
                /* eight more: a row that begins in the last column of the last row ends beyond it */
                (w->tile_depth = es_allocate_array(context, ES_TILE_WORDS + 8, sizeof *w->tile_depth)) &&
-               (w->tile_id = es_allocate_array(context, ES_TILE_WORDS + 8, sizeof *w->tile_id));
+               (w->tile_number = es_allocate_zero(context, sizeof *w->tile_number * (ES_TILE_FRONT + ES_TILE_WORDS + 8))) &&
+               (w->visible = es_allocate_zero(context, sizeof *w->visible * ES_TILE_VISIBLE_MAX)) &&
+               (w->slot_number = es_allocate_array(context, ES_TILE_VISIBLE_MAX, sizeof *w->slot_number)) &&
+               (w->slot_pixel = es_allocate_array(context, ES_TILE_VISIBLE_MAX, sizeof *w->slot_pixel));
     }
     if (!fine) {
         es_rasterizer_destroy(r);
@@ -138,11 +146,11 @@ static void draw_tiles(void* user, uint32_t begin, uint32_t end, uint32_t worker
     es_rasterizer* r = d->rasterizer;
     es_raster_worker* w = &r->workers[worker];
     for (uint32_t t = begin; t < end; t++) {
-        es_tile tile = {.depth = w->tile_depth, .id = d->depth ? NULL : w->tile_id, .block_minimum = w->block_minimum,
+        es_tile tile = {.depth = w->tile_depth, .number = d->depth ? NULL : w->tile_number + ES_TILE_FRONT, .triangle_ids = w->triangle_ids, .next_number = 1, .block_minimum = w->block_minimum,
             .x = (int32_t)(t % r->tiles_x) * ES_TILE_SIZE, .y = (int32_t)(t / r->tiles_x) * ES_TILE_SIZE, .width = d->view->width, .height = d->view->height,
             .chunks = r->chunks, .instances = r->instances};
         memset(tile.depth, 0, ES_TILE_WORDS * sizeof *tile.depth);
-        if (tile.id) memset(tile.id, 0, ES_TILE_WORDS * sizeof *tile.id);
+        if (tile.number) memset(tile.number, 0, ES_TILE_WORDS * sizeof *tile.number);
         memset(w->block_minimum, 0, sizeof w->block_minimum);
         const uint32_t* first = r->key_first + (size_t)t * ES_RECORD_KINDS;
         for (uint32_t i = first[ES_RECORDS_LARGE]; i < first[ES_RECORDS_LARGE + 1]; i++) r->kernels->draw_large(&tile, &r->segments[i]);
@@ -153,6 +161,10 @@ static void draw_tiles(void* user, uint32_t begin, uint32_t end, uint32_t worker
             copy_depth(d, &tile, w);
         } else {
             es_resolve_job job = d->resolve;
+            job.visible = w->visible;
+            job.slot = w->slot;
+            job.slot_number = w->slot_number;
+            job.slot_pixel = w->slot_pixel;
             r->kernels->resolve_tile(&job, &tile);
             w->pixels += job.pixels;
         }
@@ -171,6 +183,29 @@ static es_result check(es_context* context, const es_draw_list* list, const es_r
             return es_misuse(context, ES_INVALID_ARGUMENT, "instance %u of the draw list: its mesh has triangles but no positions or indices", i);
     }
     return ES_OK;
+}
+
+/* Room for every worker to number the records of the fullest tile. */
+static bool reserve_numbers(es_rasterizer* r)
+{
+    es_context* context = r->context;
+    const size_t needed = (size_t)r->tile_records_max + 16, room = needed + needed / 4; /* the next frame may need a little more */
+    for (uint32_t i = 0; i < r->worker_count; i++) {
+        es_raster_worker* w = &r->workers[i];
+        if (w->number_capacity >= needed) continue;
+        es_release(context, w->triangle_ids, sizeof *w->triangle_ids * w->number_capacity);
+        es_release(context, w->slot, sizeof *w->slot * w->number_capacity);
+        w->number_capacity = 0;
+        w->slot = NULL;
+        if (!(w->triangle_ids = es_allocate_zero(context, sizeof *w->triangle_ids * room))) return false;
+        if (!(w->slot = es_allocate_zero(context, sizeof *w->slot * room))) {
+            es_release(context, w->triangle_ids, sizeof *w->triangle_ids * room);
+            w->triangle_ids = NULL;
+            return false;
+        }
+        w->number_capacity = room;
+    }
+    return true;
 }
 
 static bool run_stages(draw* d, const es_draw_list* list, uint32_t planes, es_raster_stats* stats)
@@ -218,12 +253,15 @@ static bool run_stages(draw* d, const es_draw_list* list, uint32_t planes, es_ra
     double slope = view->projection.m[10] != 0 ? view->projection.m[10] : 1;
     job->distance_scale = (float)(-1.0 / slope);
     job->distance_offset = (float)(view->projection.m[14] / slope);
+    job->z_scale = -view->projection.m[10];
+    job->z_offset = view->projection.m[14];
 
     es_parallel_for(context, r->vertex_block_count, 4, transform, d);
     es_parallel_for(context, r->chunk_count, 1, bin, d);
     bool failed = false;
     for (uint32_t i = 0; i < r->worker_count; i++) failed |= r->workers[i].failed;
     if (failed || !es_order_segments(r)) return false;
+    if (planes && !reserve_numbers(r)) return false;
     es_parallel_for(context, r->tiles_x * r->tiles_y, 1, draw_tiles, d);
 
     if (stats) {

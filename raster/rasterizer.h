@@ -14,7 +14,11 @@ typedef struct es_raster_worker {
     uint32_t* touched;              /* keys whose count is not zero */
     size_t key_capacity;
     float* tile_depth;
-    uint32_t* tile_id;
+    uint32_t* tile_number;
+    es_visible_triangle* visible;
+    uint32_t *slot_number, *slot_pixel;
+    uint32_t *triangle_ids, *slot;  /* by number in a tile; slot is zero between tiles */
+    size_t number_capacity;
     float block_minimum[64];
     bool failed;
     uint64_t culled, clipped, hidden, pixels;
@@ -42,6 +46,7 @@ struct es_rasterizer {
     uint32_t instance_count, chunk_count, vertex_block_count, tiles_x, tiles_y;
     size_t vertex_count, delta_count;
     uint64_t instances_culled, triangle_count, segment_pairs;
+    uint32_t tile_records_max;
 };
 
 /* Double-precision matrices of a view, row-major. */

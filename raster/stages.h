@@ -4,10 +4,11 @@
  *   vertex.c      positions              -> snapped and homogeneous vertices         (parallel over vertex blocks)
  *   bin.c         indices, snapped       -> triangle records, lists of them per tile (parallel over chunks; clip.c where needed)
  *   bins.c        lists per chunk        -> segments ordered by tile                 (serial, one entry per chunk and tile)
- *   tile.c        segments               -> depth and triangle id of one tile        (parallel over tiles)
- *   resolve.c     depth and id           -> G-buffer planes of the tile, while it is in cache
+ *   tile.c        segments               -> depth and record number of one tile      (parallel over tiles)
+ *   resolve.c     depth and number       -> G-buffer planes of the tile, while it is in cache
  *
- * A larger depth wins; among equal depths the smaller id, so the order in which triangles come never matters.
+ * A larger depth wins; among equal depths the record drawn first. The order in a tile is fixed: large, small, masked; then by chunk;
+ * then as binned. It does not depend on the instruction set or on threads.
  */
 #ifndef EARTHSHINE_RASTER_STAGES_H
 #define EARTHSHINE_RASTER_STAGES_H
@@ -107,10 +108,12 @@ typedef struct es_chunk {
     uint32_t segment_count;
 } es_chunk;
 
-/* One tile being drawn: depth 0 and id 0 where nothing is. */
+/* One tile being drawn: depth 0 and number 0 where nothing is. Records are numbered from 1 as they are drawn. */
 typedef struct es_tile {
     float* depth;                       /* ES_TILE_WORDS each */
-    uint32_t* id;                       /* NULL: depth only */
+    uint32_t* number;                   /* NULL: depth only; otherwise ES_TILE_FRONT words before it can be read */
+    uint32_t* triangle_ids;             /* by number; eight words more than there are records */
+    uint32_t next_number;
     float* block_minimum;               /* of the 8x8 blocks' depth, or less: 64 */
     int32_t x, y;                       /* pixel of the tile's first column and row */
     uint32_t width, height;             /* of the view */
@@ -118,6 +121,22 @@ typedef struct es_tile {
     const es_chunk* chunks;             /* for alpha masks */
     const es_prepared_instance* instances;
 } es_tile;
+
+/* A visible triangle of a tile: planes over the pixel's offset (X, Y) from a pixel where the triangle is seen, each x * X + y * Y + c.
+ * Perspective: `distance` is 1 / w and the others are divided by w too; orthographic: all are as they are. */
+typedef struct es_plane { float x, y, c; } es_plane;
+typedef struct es_visible_triangle {
+    es_plane distance;   float pixel_x;      /* the pixel, from the view's centre */
+    float distance_low, distance_high, pixel_y; uint32_t instance; /* index | ES_VISIBLE_… */
+    es_plane normal_x;   uint32_t geometric_normal;
+    es_plane normal_y;   uint32_t triangle;  /* + 1 */
+    es_plane normal_z;   uint32_t instance_id; /* + 1 */
+    es_plane red;        uint32_t surface;
+    es_plane green;      uint32_t emission;
+    es_plane blue;       uint32_t material;  /* << 16 */
+} es_visible_triangle;
+_Static_assert(sizeof(es_visible_triangle) == 128, "visible triangles are gathered 16 bytes at a time");
+enum { ES_VISIBLE_COMPLEX = 1 << 31, ES_VISIBLE_MOVING = 1 << 30, ES_VISIBLE_INSTANCE = ES_VISIBLE_MOVING - 1 };
 
 /* Motion of a surface that was not in front of last frame's eye: its place then lies outside any view. */
 #define ES_MOTION_BEHIND 65536.0f
@@ -131,7 +150,12 @@ typedef struct es_resolve_job {
     bool orthographic;
     float row_x[4], row_y[4], row_z[4], row_w[4]; /* world to window */
     float distance_scale, distance_offset;        /* orthographic: distance = offset + scale * z */
+    float z_scale, z_offset;                      /* z = offset + scale * distance */
     es_gbuffer gbuffer;
+    es_visible_triangle* visible;                 /* ES_TILE_VISIBLE_MAX */
+    uint32_t* slot;                               /* by number: 1 + index in `visible`, 0 between tiles */
+    uint32_t* slot_number;                        /* ES_TILE_VISIBLE_MAX: the inverse, and the pixel where it was seen first */
+    uint32_t* slot_pixel;
     uint64_t pixels;
 } es_resolve_job;
 

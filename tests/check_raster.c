@@ -261,23 +261,27 @@ static void random_records(tile_input* in)
     for (int i = 0; i < 8; i++) in->list[RECORDS + i] = 0xffffffff; /* padding is loaded, never used */
 }
 
-typedef struct tile_out { buffer depth, id, minimum; uint64_t hidden; } tile_out;
+typedef struct tile_out { buffer depth, id, ids, minimum; uint64_t hidden; } tile_out;
 /* kind: 0 small, 1 large, 2 masked */
 static tile_out run_tile(const es_raster_kernels* k, const tile_input* in, int kind, bool ids, uint32_t count)
 {
-    tile_out o = {new_buffer((ES_TILE_WORDS + 8) * 4), new_buffer((ES_TILE_WORDS + 8) * 4), new_buffer(256), 0};
+    tile_out o = {new_buffer((ES_TILE_WORDS + 8) * 4), new_buffer((ES_TILE_WORDS + 8) * 4), new_buffer((RECORDS + 16) * 4), new_buffer(256), 0};
+    memset(data(o.ids), 0, (RECORDS + 16) * 4);
     memset(data(o.depth), 0, (ES_TILE_WORDS + 8) * 4);
     memset(data(o.id), 0, (ES_TILE_WORDS + 8) * 4);
     memset(data(o.minimum), 0, 256);
     es_tile tile = in->tile;
     tile.depth = data(o.depth);
-    tile.id = ids ? data(o.id) : NULL;
+    tile.number = ids ? data(o.id) : NULL;
+    tile.triangle_ids = data(o.ids);
+    tile.next_number = 1;
     tile.block_minimum = data(o.minimum);
     es_segment segment = {in->list, kind == 0 ? (const void*)in->small : in->large, count, 0};
     if (kind == 0) k->draw_small(&tile, &segment);
     if (kind == 1) k->draw_large(&tile, &segment);
     if (kind == 2) k->draw_masked(&tile, &segment);
     k->block_minima(&tile);
+    assert_int_equal(tile.next_number, 1 + count);
     o.hidden = tile.hidden;
     return o;
 }
@@ -285,6 +289,7 @@ static void free_tile(tile_out* o)
 {
     free_buffer(o->depth);
     free_buffer(o->id);
+    free_buffer(o->ids);
     free_buffer(o->minimum);
 }
 
@@ -355,10 +360,12 @@ static void test_tiles(void** state)
                     tile_out o = run_tile(k, in, kind, ids, count);
                     check_equal(expected.depth, o.depth, true);
                     check_equal(expected.id, o.id, false);
+                    check_equal(expected.ids, o.ids, false);
                     check_equal(expected.minimum, o.minimum, true);
                     assert_true(o.hidden == expected.hidden);
                     check_guards(o.depth);
                     check_guards(o.id);
+                    check_guards(o.ids);
                     check_guards(o.minimum);
                     free_tile(&o);
                 }
@@ -372,7 +379,7 @@ static void test_tiles(void** state)
     free(texels);
 }
 
-/* The result does not depend on the order in which records come. */
+/* Depth does not depend on the order in which records come; nor does the triangle, but for equal depths. */
 static void test_order(void** state)
 {
     tile_input* in = calloc(1, sizeof *in);
@@ -390,7 +397,9 @@ static void test_order(void** state)
             for (int y = 0; y < 64; y++)
                 for (int x = 0; x < 64; x++) {
                     assert_int_equal(((uint32_t*)data(a.depth))[y * ES_TILE_PITCH + x], ((uint32_t*)data(c.depth))[y * ES_TILE_PITCH + x]);
-                    assert_int_equal(((uint32_t*)data(a.id))[y * ES_TILE_PITCH + x], ((uint32_t*)data(c.id))[y * ES_TILE_PITCH + x]);
+                    uint32_t at = (uint32_t)(y * ES_TILE_PITCH + x), first = ((uint32_t*)data(a.id))[at], second = ((uint32_t*)data(c.id))[at];
+                    float z = ((float*)data(a.depth))[at];
+                    if (z > 0 && z < 1) assert_int_equal(((uint32_t*)data(a.ids))[first], ((uint32_t*)data(c.ids))[second]);
                 }
             free_tile(&a);
             free_tile(&c);
@@ -401,11 +410,18 @@ static void test_order(void** state)
 
 /* ---- resolve ------------------------------------------------------------------------------------------------------------------ */
 
-enum { WIDTH = 61, HEIGHT = 23, STRIDE = 64, PLANES = 11 };
+enum { WIDTH = 61, HEIGHT = 23, STRIDE = 64, PLANES = 11, NUMBERS = 600 };
 
 static buffer run_resolve(const es_raster_kernels* k, es_resolve_job job, const es_tile* tile)
 {
     buffer b = new_buffer(4 * STRIDE * HEIGHT * PLANES);
+    buffer scratch[4] = {new_buffer(ES_TILE_VISIBLE_MAX * sizeof(es_visible_triangle)), new_buffer(4 * (NUMBERS + 16)), new_buffer(4 * ES_TILE_VISIBLE_MAX), new_buffer(4 * ES_TILE_VISIBLE_MAX)};
+    job.visible = data(scratch[0]);
+    job.slot = data(scratch[1]);
+    job.slot_number = data(scratch[2]);
+    job.slot_pixel = data(scratch[3]);
+    memset(job.visible, 0, ES_TILE_VISIBLE_MAX * sizeof(es_visible_triangle));
+    memset(job.slot, 0, 4 * (NUMBERS + 16));
     uint32_t* p = data(b);
     memset(p, 0, 4 * STRIDE * HEIGHT * PLANES);
     void** slots[PLANES] = {(void**)&job.gbuffer.depth, (void**)&job.gbuffer.motion_x, (void**)&job.gbuffer.motion_y, (void**)&job.gbuffer.normal,
@@ -413,6 +429,11 @@ static buffer run_resolve(const es_raster_kernels* k, es_resolve_job job, const 
         (void**)&job.gbuffer.emission, (void**)&job.gbuffer.instance, (void**)&job.gbuffer.triangle};
     for (int i = 0; i < PLANES; i++) *slots[i] = p + STRIDE * HEIGHT * i;
     k->resolve_tile(&job, tile);
+    for (uint32_t i = 1; i < NUMBERS + 16; i++) assert_int_equal(job.slot[i], 0);
+    for (int i = 0; i < 4; i++) {
+        check_guards(scratch[i]);
+        free_buffer(scratch[i]);
+    }
     return b;
 }
 
@@ -425,7 +446,9 @@ static void test_resolve(void** state)
     es_window_vertex* window = calloc(INSTANCES * V, sizeof *window);
     es_window_vertex* deltas = calloc(INSTANCES * V, sizeof *deltas);
     float* depth = calloc(ES_TILE_WORDS + 8, 4);
-    uint32_t* id = calloc(ES_TILE_WORDS + 8, 4);
+    uint32_t* number_memory = calloc(ES_TILE_FRONT + ES_TILE_WORDS + 8, 4);
+    uint32_t* number = number_memory + ES_TILE_FRONT;
+    uint32_t* ids = calloc(NUMBERS + 16, 4);
     uint16_t* texels = malloc(8 * 400);
     for (int i = 0; i < 4 * 400; i++) texels[i] = (uint16_t)random_bits();
     es_texture_image image = {.width = 16, .height = 15, .level_count = 5, .level_offset = {0, 240, 296, 308, 310}, .texels = texels};
@@ -468,11 +491,12 @@ static void test_resolve(void** state)
         }
         for (int i = 0; i < ES_TILE_WORDS; i++) {
             depth[i] = random_bits() % 5 ? 0.5f : 0;
-            id[i] = (trial % 3 ? random_bits() : (uint32_t)i / 16) % INSTANCES << ES_CHUNK_BITS | random_bits() % T;
+            number[i] = depth[i] > 0 ? 1 + (trial % 3 ? random_bits() : (uint32_t)i / 13) % NUMBERS : 0;
         }
-        es_tile tile = {.depth = depth, .id = id, .x = 0, .y = 0, .width = WIDTH, .height = HEIGHT};
+        for (uint32_t i = 1; i <= NUMBERS; i++) ids[i] = random_bits() % INSTANCES << ES_CHUNK_BITS | random_bits() % T;
+        es_tile tile = {.depth = depth, .number = number, .triangle_ids = ids, .next_number = NUMBERS + 1, .x = 0, .y = 0, .width = WIDTH, .height = HEIGHT};
         es_resolve_job job = {.instances = instances, .chunk_instance = chunk_instance, .vertices = window, .deltas = deltas, .orthographic = trial % 6 == 5,
-            .row_x = {30, 0, 0, 0}, .row_y = {0, -11, 1, 0}, .row_z = {0, 0, 0.1f, 0.1f}, .row_w = {0, 0, -1, 0}, .distance_scale = -9, .distance_offset = 9,
+            .row_x = {30, 0, 0, 0}, .row_y = {0, -11, 1, 0}, .row_z = {0, 0, 0.1f, 0.1f}, .row_w = {0, 0, -1, 0}, .distance_scale = -9, .distance_offset = 9, .z_scale = -0.1f, .z_offset = 0.1f,
             .gbuffer = {.width = WIDTH, .height = HEIGHT, .stride = STRIDE, .planes = ES_GBUFFER_ALL}};
         buffer expected = run_resolve(scalar(), job, &tile);
         FOR_EACH_ISA(k)
@@ -489,7 +513,8 @@ static void test_resolve(void** state)
     free(window);
     free(deltas);
     free(depth);
-    free(id);
+    free(number_memory);
+    free(ids);
     free(texels);
 }
 

@@ -1,4 +1,4 @@
-/* Depth and triangle ids of a tile to the G-buffer's planes: every visible pixel once, eight at a time.
+/* Depth and record numbers of a tile to the G-buffer's planes: every visible pixel once, eight at a time.
  *
  * Attributes are interpolated with homogeneous edge functions (Olano and Greer 1997, "Triangle Scan Conversion using 2D
  * Homogeneous Coordinates"). With x_i = (window x * w)_i - X w_i relative to the pixel (X, Y), and y_i likewise,
@@ -11,8 +11,14 @@
  *
  *   n = S_X (row_x - X row_w) + S_Y (row_y - Y row_w) + S row_w,   n · (eye - p) = -D
  *
- * Visibility is decided on snapped vertices, so a pixel centre can lie outside the unsnapped triangle; negative b_i / S are set to
- * zero, which keeps attributes between those of the vertices even for slivers.
+ * Any attribute a is sum of lambda_i a_i, so a / w = (sum of b_i a_i) / D is linear in X and Y as well. A tile therefore
+ *   1. finds its visible triangles, and one pixel of each;
+ *   2. sets each up once: planes for 1 / w and attributes / w about that pixel (es_visible_triangle);
+ *   3. evaluates the planes per pixel: one 128-byte record a lane instead of three vertices of three streams.
+ * Triangles with textures or moving vertices ("complex") are interpolated per pixel from their vertices instead.
+ *
+ * Visibility is decided on snapped vertices, so a pixel centre can lie outside the unsnapped triangle; where lambda is computed, negative
+ * ones become zero, and 1 / w is kept within the vertices' range, so that slivers stay harmless.
  */
 #include "raster/kernel_table.h"
 #include "raster/kernels/texture_sampling.h"
@@ -20,20 +26,21 @@
 #include "platform/simd.h"
 
 typedef struct v3 { vf x, y, z; } v3;
-/* Where a group's results go: pixel `at` of the planes. Lanes of `mask` are written; the others become zero for the group's first
- * instance and keep what an earlier one wrote otherwise. */
+/* Where eight pixels' results go: pixel `at` of the planes. Lanes of `mask` are written; the others become zero the first time and keep
+ * what they have afterwards. */
 typedef struct target { const es_gbuffer* planes; size_t at; vm mask; bool first; } target;
 
 VINL void put(const target* t, uint32_t* plane, vi value)
 {
-    vi old = t->first ? vi_zero() : vi_load(plane + t->at);
-    vi_store(plane + t->at, vi_select(t->mask, value, old));
+    if (t->first) vi_store(plane + t->at, t->mask & value);
+    else vi_store(plane + t->at, vi_select(t->mask, value, vi_load(plane + t->at)));
 }
 VINL void put_float(const target* t, float* plane, vf value) { put(t, (uint32_t*)plane, vi_from_bits(value)); }
 
 VINL vf dot(v3 a, v3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 VINL v3 cross(v3 a, v3 b) { return (v3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 VINL v3 scale(v3 a, vf s) { return (v3){a.x * s, a.y * s, a.z * s}; }
+VINL v3 flip(v3 a, vi sign) { return (v3){vf_from_bits(vi_from_bits(a.x) ^ sign), vf_from_bits(vi_from_bits(a.y) ^ sign), vf_from_bits(vi_from_bits(a.z) ^ sign)}; }
 VINL v3 select3(vm m, v3 a, v3 b) { return (v3){vf_select(m, a.x, b.x), vf_select(m, a.y, b.y), vf_select(m, a.z, b.z)}; }
 /* has a direction: the sum of magnitudes is neither zero, too small or large, nor NaN */
 VINL vm directed(v3 a)
@@ -56,9 +63,15 @@ typedef struct surface8 {
     vm active, back;             /* back: seen from the side where the winding is clockwise */
     vi index[3];
     uint32_t offset[3][VW];      /* of the vertices in a stream, bytes: kept in memory, from where loads take them */
-    vf w[3], lambda[3];
-    vf bx[3], by[3], sum_x, sum_y, inverse;
+    vi triangle, sign;           /* sign: the sign bit of S */
+    vf w[3], z[3], lambda[3];
+    vf bx[3], by[3], sum_x, sum_y; /* derivatives of b and S in X and Y */
+    vf sum, inverse;             /* 1 / S */
+    vf here_w, here_z;           /* at the pixel */
 } surface8;
+
+/* Makes loads take the offsets from memory; compilers otherwise move each out of a vector register, at twice the instructions. */
+VINL void keep_in_memory(const uint32_t offset[VW]) { __asm__ volatile("" : : "r"(offset) : "memory"); }
 
 VINL void gather_vertex(const void* stream, const uint32_t offset[VW], vf* a, vf* b, vf* c, vf* d)
 {
@@ -208,96 +221,125 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
 #undef ES_SAMPLE_
 }
 
-VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance* instance, const target* t, vi id, vf x, vf y)
+/* Edge functions at the pixel (x, y) and what follows from them. */
+VINL void start_surface(const es_resolve_job* job, const es_prepared_instance* instance, vm active, vi id, vf x, vf y, bool gradients, surface8* s)
 {
-    const es_raster_mesh* mesh = instance->mesh;
-    const es_prepared_material* material = instance->material;
-    const uint32_t planes = job->gbuffer.planes;
-    surface8 s; /* not initialised as a whole: clearing it cost more than the interpolation */
-    s.instance = instance;
-    const vm active = s.active = t->mask;
-    const es_gbuffer* planes_of = t->planes;
+    s->instance = instance;
+    s->active = active;
+    s->triangle = active & (id - vi_set1((int32_t)instance->first_id));
+    vi unused;
+    vi_gather4(instance->mesh->indices, 12, s->triangle, &s->index[0], &s->index[1], &s->index[2], &unused);
 
-    vi triangle = active & (id - vi_set1((int32_t)instance->first_id)), unused;
-    if (planes & ES_GBUFFER_TRIANGLE) put(t, planes_of->triangle, triangle + vi_set1(1));
-    if (planes & ES_GBUFFER_INSTANCE) put(t, planes_of->instance, vi_set1((int32_t)(instance->instance_id + 1)));
-    vi_gather4(mesh->indices, 12, triangle, &s.index[0], &s.index[1], &s.index[2], &unused);
-
-    vf xr[3], yr[3], z[3], b[3];
+    vf xr[3], yr[3], b[3];
     for (int k = 0; k < 3; k++) {
-        vi_store(s.offset[k], s.index[k] << 4);
-        /* or the compiler moves every offset out of a vector register, at twice the instructions of loading it */
-        __asm__ volatile("" : : "r"(s.offset[k]) : "memory");
-        gather_vertex(job->vertices + instance->first_vertex, s.offset[k], &xr[k], &yr[k], &z[k], &s.w[k]);
-        xr[k] = xr[k] - x * s.w[k];
-        yr[k] = yr[k] - y * s.w[k];
+        vi_store(s->offset[k], s->index[k] << 4);
+        keep_in_memory(s->offset[k]);
+        gather_vertex(job->vertices + instance->first_vertex, s->offset[k], &xr[k], &yr[k], &s->z[k], &s->w[k]);
+        xr[k] = xr[k] - x * s->w[k];
+        yr[k] = yr[k] - y * s->w[k];
     }
     b[0] = xr[1] * yr[2] - xr[2] * yr[1];
     b[1] = xr[2] * yr[0] - xr[0] * yr[2];
     b[2] = xr[0] * yr[1] - xr[1] * yr[0];
-    vf sum = b[0] + b[1] + b[2], zero = vf_zero();
+    vf sum = b[0] + b[1] + b[2], zero = vf_zero(), one = vf_set1(1.0f);
     vi sign = vi_from_bits(sum) & vi_set1(INT32_MIN);
     vf c0 = vf_max(vf_from_bits(vi_from_bits(b[0]) ^ sign), zero), c1 = vf_max(vf_from_bits(vi_from_bits(b[1]) ^ sign), zero);
     vf c2 = vf_max(vf_from_bits(vi_from_bits(b[2]) ^ sign), zero);
     vf total = c0 + c1 + c2;
     vm solid = vm_gt(total, zero);
-    vf inverse = vf_set1(1.0f) / vf_select(solid, total, vf_set1(1.0f));
-    s.lambda[0] = vf_select(solid, c0 * inverse, vf_set1(1.0f));
-    s.lambda[1] = c1 * inverse;
-    s.lambda[2] = c2 * inverse;
+    vf inverse = one / vf_select(solid, total, one);
+    s->sum = sum;
+    s->sign = sign;
+    s->lambda[0] = vf_select(solid, c0 * inverse, one);
+    s->lambda[1] = c1 * inverse;
+    s->lambda[2] = c2 * inverse;
+    s->inverse = vf_from_bits(vi_from_bits(inverse) | sign);
     /* window y is down: counter-clockwise triangles have negative S */
     if (instance->cull_positive == instance->cull_negative)
-        s.back = vm_lt(vf_from_bits(sign | vi_set1(0x3f800000)), zero) ^ (instance->mirrored ? vi_zero() : vm_all_lanes());
+        s->back = vm_lt(vf_from_bits(sign | vi_set1(0x3f800000)), zero) ^ (instance->mirrored ? vi_zero() : vm_all_lanes());
     else /* one side is culled by the snapped area, which decides even where S rounds to the other sign */
-        s.back = instance->cull_positive == instance->mirrored ? vm_all_lanes() : vi_zero();
-
-    vf w = s.lambda[0] * s.w[0] + s.lambda[1] * s.w[1] + s.lambda[2] * s.w[2];
-    vf depth_z = s.lambda[0] * z[0] + s.lambda[1] * z[1] + s.lambda[2] * z[2];
-    vf distance = job->orthographic ? vf_set1(job->distance_offset) + vf_set1(job->distance_scale) * depth_z : w;
-    if (planes & ES_GBUFFER_DEPTH) put_float(t, planes_of->depth, vf_max(distance, vf_set1(1e-30f))); /* zero would say that nothing is seen */
-
-    bool gradients = (planes & (ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL)) || material->any_texture;
-    v3 geometric = {zero, zero, zero};
-    if (gradients) {
-        for (int k = 0; k < 3; k++) {
-            int i = k < 2 ? k + 1 : 0, j = i < 2 ? i + 1 : 0;
-            s.bx[k] = s.w[j] * yr[i] - s.w[i] * yr[j];
-            s.by[k] = s.w[i] * xr[j] - s.w[j] * xr[i];
-        }
-        s.sum_x = s.bx[0] + s.bx[1] + s.bx[2];
-        s.sum_y = s.by[0] + s.by[1] + s.by[2];
-        s.inverse = vf_from_bits(vi_from_bits(inverse) | sign);
-        if (job->orthographic) {
-            /* the plane of z over the window, times S; row_z points to the eye */
-            vf zx = s.bx[0] * z[0] + s.bx[1] * z[1] + s.bx[2] * z[2], zy = s.by[0] * z[0] + s.by[1] * z[1] + s.by[2] * z[2];
-            geometric = (v3){sum * vf_set1(job->row_z[0]) - zx * vf_set1(job->row_x[0]) - zy * vf_set1(job->row_y[0]),
-                sum * vf_set1(job->row_z[1]) - zx * vf_set1(job->row_x[1]) - zy * vf_set1(job->row_y[1]),
-                sum * vf_set1(job->row_z[2]) - zx * vf_set1(job->row_x[2]) - zy * vf_set1(job->row_y[2])};
-        } else {
-            vf along = s.sum_x * x + s.sum_y * y - sum;
-            geometric = (v3){along * vf_set1(job->row_w[0]) - s.sum_x * vf_set1(job->row_x[0]) - s.sum_y * vf_set1(job->row_y[0]),
-                along * vf_set1(job->row_w[1]) - s.sum_x * vf_set1(job->row_x[1]) - s.sum_y * vf_set1(job->row_y[1]),
-                along * vf_set1(job->row_w[2]) - s.sum_x * vf_set1(job->row_x[2]) - s.sum_y * vf_set1(job->row_y[2])};
-        }
-        geometric.x = vf_from_bits(vi_from_bits(geometric.x) ^ sign);
-        geometric.y = vf_from_bits(vi_from_bits(geometric.y) ^ sign);
-        geometric.z = vf_from_bits(vi_from_bits(geometric.z) ^ sign);
-        vf toward = job->orthographic ? vf_set1(1.0f) : vf_set1(-1.0f);
-        const float* eye = job->orthographic ? job->row_z : job->row_w;
-        v3 fallback = {vf_set1(eye[0]) * toward, vf_set1(eye[1]) * toward, vf_set1(eye[2]) * toward};
-        geometric = select3(directed(geometric), geometric, fallback);
-        if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) put(t, planes_of->geometric_normal, es_pack_normal_v(geometric.x, geometric.y, geometric.z));
+        s->back = instance->cull_positive == instance->mirrored ? vm_all_lanes() : vi_zero();
+    s->here_w = s->lambda[0] * s->w[0] + s->lambda[1] * s->w[1] + s->lambda[2] * s->w[2];
+    s->here_z = s->lambda[0] * s->z[0] + s->lambda[1] * s->z[1] + s->lambda[2] * s->z[2];
+    if (!gradients) return;
+    for (int k = 0; k < 3; k++) {
+        int i = k < 2 ? k + 1 : 0, j = i < 2 ? i + 1 : 0;
+        s->bx[k] = s->w[j] * yr[i] - s->w[i] * yr[j];
+        s->by[k] = s->w[i] * xr[j] - s->w[j] * xr[i];
     }
+    s->sum_x = s->bx[0] + s->bx[1] + s->bx[2];
+    s->sum_y = s->by[0] + s->by[1] + s->by[2];
+}
 
-    v3 normal = geometric;
-    bool own_normals = (planes & ES_GBUFFER_NORMAL) && mesh->normals;
-    if (own_normals) normal = transform3(instance->normal_matrix, interpolate3(&s, mesh->normals, NULL));
-    else if (material->any_texture) {
-        /* geometric normals point to the eye, the frame of a normal map to the front */
-        normal.x = vf_from_bits(vi_from_bits(normal.x) ^ (s.back & vi_set1(INT32_MIN)));
-        normal.y = vf_from_bits(vi_from_bits(normal.y) ^ (s.back & vi_set1(INT32_MIN)));
-        normal.z = vf_from_bits(vi_from_bits(normal.z) ^ (s.back & vi_set1(INT32_MIN)));
+/* Turned to the eye, any length. */
+VINL v3 geometric_normal(const es_resolve_job* job, const surface8* s, vf x, vf y)
+{
+    v3 n;
+    if (job->orthographic) {
+        /* the plane of z over the window, times S; row_z points to the eye */
+        vf zx = s->bx[0] * s->z[0] + s->bx[1] * s->z[1] + s->bx[2] * s->z[2], zy = s->by[0] * s->z[0] + s->by[1] * s->z[1] + s->by[2] * s->z[2];
+        n = (v3){s->sum * vf_set1(job->row_z[0]) - zx * vf_set1(job->row_x[0]) - zy * vf_set1(job->row_y[0]),
+            s->sum * vf_set1(job->row_z[1]) - zx * vf_set1(job->row_x[1]) - zy * vf_set1(job->row_y[1]),
+            s->sum * vf_set1(job->row_z[2]) - zx * vf_set1(job->row_x[2]) - zy * vf_set1(job->row_y[2])};
+    } else {
+        vf along = s->sum_x * x + s->sum_y * y - s->sum;
+        n = (v3){along * vf_set1(job->row_w[0]) - s->sum_x * vf_set1(job->row_x[0]) - s->sum_y * vf_set1(job->row_y[0]),
+            along * vf_set1(job->row_w[1]) - s->sum_x * vf_set1(job->row_x[1]) - s->sum_y * vf_set1(job->row_y[1]),
+            along * vf_set1(job->row_w[2]) - s->sum_x * vf_set1(job->row_x[2]) - s->sum_y * vf_set1(job->row_y[2])};
     }
+    n = flip(n, s->sign);
+    vf toward = job->orthographic ? vf_set1(1.0f) : vf_set1(-1.0f);
+    const float* eye = job->orthographic ? job->row_z : job->row_w;
+    v3 fallback = {vf_set1(eye[0]) * toward, vf_set1(eye[1]) * toward, vf_set1(eye[2]) * toward};
+    return select3(directed(n), n, fallback);
+}
+
+VINL vf distance_of(const es_resolve_job* job, const surface8* s)
+{
+    vf distance = job->orthographic ? vf_set1(job->distance_offset) + vf_set1(job->distance_scale) * s->here_z : s->here_w;
+    return vf_max(distance, vf_set1(1e-30f)); /* zero would say that nothing is seen */
+}
+
+/* From the change (dx, dy, dw) of the homogeneous window position since last frame, so that what stands still has motion zero
+ * exactly: X - (X w + dx) / (w + dw) = (X dw - dx) / (w + dw). */
+VINL void motion_of(vf x, vf y, vf w, vf dx, vf dy, vf dw, vf* motion_x, vf* motion_y)
+{
+    vf then = w + dw, away = vf_set1(ES_MOTION_BEHIND);
+    vm before = vm_gt(then, vf_zero());
+    vf inverse = vf_set1(1.0f) / vf_select(before, then, vf_set1(1.0f));
+    *motion_x = vf_select(before, vf_clamp((x * dw - dx) * inverse, vf_neg(away), away), away);
+    *motion_y = vf_select(before, vf_clamp((y * dw - dy) * inverse, vf_neg(away), away), away);
+}
+VINL void rigid_motion(const es_prepared_instance* instance, vf x, vf y, vf z, vf w, vf* motion_x, vf* motion_y)
+{
+    const float* m = instance->motion;
+    vf xw = x * w, yw = y * w;
+    vf dx = vf_set1(m[0]) * xw + vf_set1(m[1]) * yw + vf_set1(m[2]) * z + vf_set1(m[3]) * w;
+    vf dy = vf_set1(m[4]) * xw + vf_set1(m[5]) * yw + vf_set1(m[6]) * z + vf_set1(m[7]) * w;
+    vf dw = vf_set1(m[8]) * xw + vf_set1(m[9]) * yw + vf_set1(m[10]) * z + vf_set1(m[11]) * w;
+    motion_of(x, y, w, dx, dy, dw, motion_x, motion_y);
+}
+
+/* ---- complex triangles: pixel by pixel ----------------------------------------------------------------------------------- */
+
+static void resolve_complex(const es_resolve_job* job, const es_prepared_instance* instance, const target* t, vi id, vf x, vf y)
+{
+    const es_raster_mesh* mesh = instance->mesh;
+    const es_prepared_material* material = instance->material;
+    const es_gbuffer* g = &job->gbuffer;
+    const uint32_t planes = g->planes;
+    surface8 s;
+    start_surface(job, instance, t->mask, id, x, y, true, &s);
+    if (planes & ES_GBUFFER_TRIANGLE) put(t, g->triangle, s.triangle + vi_set1(1));
+    if (planes & ES_GBUFFER_INSTANCE) put(t, g->instance, vi_set1((int32_t)(instance->instance_id + 1)));
+    if (planes & ES_GBUFFER_DEPTH) put_float(t, g->depth, distance_of(job, &s));
+    v3 geometric = geometric_normal(job, &s, x, y);
+    if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) put(t, g->geometric_normal, es_pack_normal_v(geometric.x, geometric.y, geometric.z));
+
+    vi backward = s.back & vi_set1(INT32_MIN);
+    v3 normal;
+    if (mesh->normals) normal = transform3(instance->normal_matrix, interpolate3(&s, mesh->normals, NULL));
+    else normal = flip(geometric, backward); /* geometric normals point to the eye, the frame of a normal map to the front */
 
     es_rgba color = {vf_set1(material->base_color[0]), vf_set1(material->base_color[1]), vf_set1(material->base_color[2]), vf_zero()};
     if ((planes & ES_GBUFFER_ALBEDO) && mesh->colors) {
@@ -308,51 +350,249 @@ VINL void resolve_instance(const es_resolve_job* job, const es_prepared_instance
     }
     vi surface = vi_set1((int32_t)material->surface_word), emission = vi_set1((int32_t)material->emission_word);
     if (material->any_texture) resolve_textures(&s, planes, &normal, geometric, &color, &surface, &emission);
-    if (planes & ES_GBUFFER_SURFACE) put(t, planes_of->surface, surface);
-    if (planes & ES_GBUFFER_EMISSION) put(t, planes_of->emission, emission);
-
+    if (planes & ES_GBUFFER_SURFACE) put(t, g->surface, surface);
+    if (planes & ES_GBUFFER_EMISSION) put(t, g->emission, emission);
     if (planes & ES_GBUFFER_NORMAL) {
-        if (own_normals || material->any_texture) {
-            vi flip = s.back & vi_set1(INT32_MIN);
-            v3 turned = {vf_from_bits(vi_from_bits(normal.x) ^ flip), vf_from_bits(vi_from_bits(normal.y) ^ flip), vf_from_bits(vi_from_bits(normal.z) ^ flip)};
-            normal = select3(directed(turned), turned, geometric);
-            put(t, planes_of->normal, es_pack_normal_v(normal.x, normal.y, normal.z));
-        } else {
-            put(t, planes_of->normal, es_pack_normal_v(geometric.x, geometric.y, geometric.z));
-        }
+        normal = flip(normal, backward);
+        normal = select3(directed(normal), normal, geometric);
+        put(t, g->normal, es_pack_normal_v(normal.x, normal.y, normal.z));
     }
     if (planes & ES_GBUFFER_ALBEDO) {
-        put(t, planes_of->albedo_rg, es_pack_unorm16_v(color.r) | (es_pack_unorm16_v(color.g) << 16));
-        put(t, planes_of->albedo_b, es_pack_unorm16_v(color.b) | vi_set1((int32_t)(instance->material_index << 16)));
+        put(t, g->albedo_rg, es_pack_unorm16_v(color.r) | (es_pack_unorm16_v(color.g) << 16));
+        put(t, g->albedo_b, es_pack_unorm16_v(color.b) | vi_set1((int32_t)(instance->material_index << 16)));
     }
-
     if (!(planes & ES_GBUFFER_MOTION)) return;
-    vf motion_x = zero, motion_y = zero;
-    if (instance->moving || instance->has_deltas) {
-        /* change of the homogeneous window position since last frame, so that what stands still has motion zero exactly:
-         * X - (X w + dx) / (w + dw) = (X dw - dx) / (w + dw) */
-        vf dx, dy, dw;
-        if (instance->has_deltas) {
-            v3 d = interpolate3(&s, &job->deltas[instance->first_delta].xw, &dw);
-            dx = d.x;
-            dy = d.y;
-        } else {
-            const float* m = instance->motion;
-            vf xw = x * w, yw = y * w;
-            dx = vf_set1(m[0]) * xw + vf_set1(m[1]) * yw + vf_set1(m[2]) * depth_z + vf_set1(m[3]) * w;
-            dy = vf_set1(m[4]) * xw + vf_set1(m[5]) * yw + vf_set1(m[6]) * depth_z + vf_set1(m[7]) * w;
-            dw = vf_set1(m[8]) * xw + vf_set1(m[9]) * yw + vf_set1(m[10]) * depth_z + vf_set1(m[11]) * w;
-        }
-        vf then = w + dw;
-        vm before = vm_gt(then, zero);
-        vf inverse_then = vf_set1(1.0f) / vf_select(before, then, vf_set1(1.0f));
-        vf away = vf_set1(ES_MOTION_BEHIND);
-        vf mx = vf_clamp((x * dw - dx) * inverse_then, vf_neg(away), away), my = vf_clamp((y * dw - dy) * inverse_then, vf_neg(away), away);
-        motion_x = vf_select(before, mx, away);
-        motion_y = vf_select(before, my, away);
+    vf motion_x = vf_zero(), motion_y = vf_zero();
+    if (instance->has_deltas) {
+        vf dw;
+        v3 d = interpolate3(&s, &job->deltas[instance->first_delta].xw, &dw);
+        motion_of(x, y, s.here_w, d.x, d.y, dw, &motion_x, &motion_y);
+    } else if (instance->moving) {
+        rigid_motion(instance, x, y, s.here_z, s.here_w, &motion_x, &motion_y);
     }
-    put_float(t, planes_of->motion_x, motion_x);
-    put_float(t, planes_of->motion_y, motion_y);
+    put_float(t, g->motion_x, motion_x);
+    put_float(t, g->motion_y, motion_y);
+}
+
+/* ---- the others: planes, once per triangle and tile ---------------------------------------------------------------------- */
+
+/* words[i] of lane l goes to float i of record l */
+VINL void store_visible(es_visible_triangle* records, vm mask, const vf words[32])
+{
+    for (int group = 0; group < 8; group++) {
+        float quads[4 * VW];
+        vf_store4(quads, words[4 * group], words[4 * group + 1], words[4 * group + 2], words[4 * group + 3]);
+        for (uint32_t bits = vm_bits(mask); bits; bits &= bits - 1) {
+            uint32_t lane = (uint32_t)__builtin_ctz(bits);
+            memcpy((char*)&records[lane] + 16 * group, &quads[4 * lane], 16);
+        }
+    }
+}
+
+typedef struct plane8 { vf x, y, c; } plane8;
+
+/* of an attribute with the values a, b, c at the vertices */
+VINL plane8 plane_of(const surface8* s, vf a, vf b, vf c, vf inverse_d, vf inverse_w)
+{
+    return (plane8){(s->bx[0] * a + s->bx[1] * b + s->bx[2] * c) * inverse_d, (s->by[0] * a + s->by[1] * b + s->by[2] * c) * inverse_d,
+        (s->lambda[0] * a + s->lambda[1] * b + s->lambda[2] * c) * inverse_w};
+}
+
+VINL void gather_corners(const surface8* s, const float* stream, v3 corner[3])
+{
+    vf unused;
+    for (int k = 0; k < 3; k++) gather_vertex(stream, s->offset[k], &corner[k].x, &corner[k].y, &corner[k].z, &unused);
+}
+
+static void set_up_visible(const es_resolve_job* job, uint32_t which, vm mask, vi id, vf x, vf y, es_visible_triangle* records)
+{
+    const es_prepared_instance* instance = &job->instances[which];
+    const es_prepared_material* material = instance->material;
+    const es_raster_mesh* mesh = instance->mesh;
+    const uint32_t planes = job->gbuffer.planes;
+    bool complex = material->any_texture || ((planes & ES_GBUFFER_MOTION) && instance->has_deltas);
+    uint32_t tag = which | (complex ? (uint32_t)ES_VISIBLE_COMPLEX : 0u) | (instance->moving ? (uint32_t)ES_VISIBLE_MOVING : 0u);
+    vf words[32];
+    for (int i = 0; i < 32; i++) words[i] = vf_zero();
+    words[7] = vf_from_bits(vi_set1((int32_t)tag));
+    if (complex) {
+        store_visible(records, mask, words);
+        return;
+    }
+    surface8 s;
+    start_surface(job, instance, mask, id, x, y, true, &s);
+    vf one = vf_set1(1.0f), tiny = vf_set1(1e-30f), inverse_d = s.inverse, inverse_w = one;
+    plane8 distance;
+    vf low, high;
+    if (job->orthographic) {
+        vf d[3];
+        for (int k = 0; k < 3; k++) d[k] = vf_max(vf_set1(job->distance_offset) + vf_set1(job->distance_scale) * s.z[k], tiny);
+        distance = plane_of(&s, d[0], d[1], d[2], inverse_d, one);
+        low = vf_min(vf_min(d[0], d[1]), d[2]);
+        high = vf_max(vf_max(d[0], d[1]), d[2]);
+    } else {
+        inverse_w = one / vf_max(s.here_w, tiny);
+        inverse_d = s.inverse * inverse_w;
+        distance = (plane8){s.sum_x * inverse_d, s.sum_y * inverse_d, inverse_w};
+        vf nearest = vf_min(vf_min(s.w[0], s.w[1]), s.w[2]), farthest = vf_max(vf_max(s.w[0], s.w[1]), s.w[2]);
+        vm before = vm_gt(nearest, tiny);
+        high = vf_select(before, one / vf_select(before, nearest, one), vf_set1(1e30f));
+        low = vf_select(before, one / vf_select(before, farthest, one), tiny);
+    }
+    words[0] = distance.x, words[1] = distance.y, words[2] = distance.c, words[3] = x;
+    words[4] = low, words[5] = high, words[6] = y;
+
+    v3 geometric = geometric_normal(job, &s, x, y);
+    words[11] = vf_from_bits(es_pack_normal_v(geometric.x, geometric.y, geometric.z));
+    if (planes & ES_GBUFFER_NORMAL) {
+        if (mesh->normals) {
+            v3 n[3];
+            gather_corners(&s, mesh->normals, n);
+            for (int k = 0; k < 3; k++) n[k] = flip(transform3(instance->normal_matrix, n[k]), s.back & vi_set1(INT32_MIN));
+            plane8 px = plane_of(&s, n[0].x, n[1].x, n[2].x, inverse_d, inverse_w), py = plane_of(&s, n[0].y, n[1].y, n[2].y, inverse_d, inverse_w);
+            plane8 pz = plane_of(&s, n[0].z, n[1].z, n[2].z, inverse_d, inverse_w);
+            words[8] = px.x, words[9] = px.y, words[10] = px.c;
+            words[12] = py.x, words[13] = py.y, words[14] = py.c;
+            words[16] = pz.x, words[17] = pz.y, words[18] = pz.c;
+        } /* else zero: not directed, so the geometric normal is taken */
+    }
+    words[15] = vf_from_bits(s.triangle + vi_set1(1));
+    words[19] = vf_from_bits(vi_set1((int32_t)(instance->instance_id + 1)));
+    if (planes & ES_GBUFFER_ALBEDO) {
+        v3 c[3];
+        vf base[3];
+        for (int i = 0; i < 3; i++) base[i] = vf_set1(material->base_color[i]);
+        if (mesh->colors) {
+            gather_corners(&s, mesh->colors, c);
+            for (int k = 0; k < 3; k++) c[k] = (v3){c[k].x * base[0], c[k].y * base[1], c[k].z * base[2]};
+        } else {
+            c[0] = c[1] = c[2] = (v3){base[0], base[1], base[2]};
+        }
+        plane8 r = plane_of(&s, c[0].x, c[1].x, c[2].x, inverse_d, inverse_w), g = plane_of(&s, c[0].y, c[1].y, c[2].y, inverse_d, inverse_w);
+        plane8 b = plane_of(&s, c[0].z, c[1].z, c[2].z, inverse_d, inverse_w);
+        words[20] = r.x, words[21] = r.y, words[22] = r.c;
+        words[24] = g.x, words[25] = g.y, words[26] = g.c;
+        words[28] = b.x, words[29] = b.y, words[30] = b.c;
+    }
+    words[23] = vf_from_bits(vi_set1((int32_t)material->surface_word));
+    words[27] = vf_from_bits(vi_set1((int32_t)material->emission_word));
+    words[31] = vf_from_bits(vi_set1((int32_t)(instance->material_index << 16)));
+    store_visible(records, mask, words);
+}
+
+/* Steps 1 and 2: slots for the triangles seen. A pixel needs a look only when neither its left nor its upper neighbour shows the same. */
+static uint32_t find_visible(es_resolve_job* job, const es_tile* tile, uint32_t rows, uint32_t columns)
+{
+    uint32_t count = 1;
+    job->slot[0] = 1;
+    for (uint32_t row = 0; row < rows; row++)
+        for (uint32_t column = 0; column < columns; column += VW) {
+            const uint32_t* here = tile->number + row * ES_TILE_PITCH + column;
+            vi now = vi_load(here), left = vi_load(here - 1), up = row ? vi_load(here - ES_TILE_PITCH) : vi_set1(-1);
+            vm same = vi_eq(now, up) | vi_eq(now, vi_zero());
+            /* what lies left of the first column is not this row's */
+            same |= vi_eq(now, left) & (column ? vm_all_lanes() : ~vm_first(1));
+            for (uint32_t bits = ~vm_bits(same) & 0xff; bits; bits &= bits - 1) {
+                uint32_t lane = (uint32_t)__builtin_ctz(bits), number = here[lane], slot = job->slot[number];
+                bool fresh = slot == 0;
+                job->slot_number[count] = number;
+                job->slot_pixel[count] = row << 16 | (column + lane);
+                count += fresh;
+                job->slot[number] = fresh ? count : slot;
+            }
+        }
+    for (uint32_t first = 1; first < count; first += VW) {
+        uint32_t n = count - first < VW ? count - first : VW;
+        vm used = vm_first((int32_t)n);
+        vi number = used & vi_load(job->slot_number + first), pixel = used & vi_load(job->slot_pixel + first);
+        vi id = used & vi_gather(tile->triangle_ids, number), instance = vi_gather(job->chunk_instance, vi_shift_right_logical(id, ES_CHUNK_BITS));
+        vf x = vf_from_int((pixel & vi_set1(0xffff)) + vi_set1(tile->x)) + vf_set1(0.5f - 0.5f * (float)tile->width);
+        vf y = vf_from_int((pixel >> 16) + vi_set1(tile->y)) + vf_set1(0.5f - 0.5f * (float)tile->height);
+        for (uint32_t pending = vm_bits(used); pending;) {
+            int32_t which = instance[__builtin_ctz(pending)];
+            vm mask = used & vi_eq(instance, vi_set1(which));
+            set_up_visible(job, (uint32_t)which, mask, id, x, y, job->visible + first);
+            pending &= ~vm_bits(mask);
+        }
+    }
+    return count;
+}
+
+/* Step 3 for eight pixels. The masks of `t` are the pixels seen. */
+VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi id_numbers, const uint32_t* triangle_ids, vf x, vf y)
+{
+    const es_gbuffer* g = &job->gbuffer;
+    const uint32_t planes = g->planes;
+    const char* records = (const char*)job->visible;
+    uint32_t offset[VW];
+    vi_store(offset, slot << 7);
+    keep_in_memory(offset);
+    vf px, py, pc, ox, oy, low, high, word;
+    gather_vertex(records, offset, &px, &py, &pc, &ox);
+    gather_vertex(records + 16, offset, &low, &high, &oy, &word);
+    vi tag = vi_from_bits(word);
+    ox = x - ox;
+    oy = y - oy;
+    vf value = vf_clamp(px * ox + py * oy + pc, low, high);
+    vf distance, w;
+    if (job->orthographic) distance = value, w = vf_set1(1.0f);
+    else distance = w = vf_set1(1.0f) / value;
+    if (planes & ES_GBUFFER_DEPTH) put_float(t, g->depth, distance);
+    if (planes & (ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL | ES_GBUFFER_TRIANGLE | ES_GBUFFER_INSTANCE)) {
+        v3 n;
+        vf geometric, triangle, instance_id;
+        gather_vertex(records + 32, offset, &px, &py, &pc, &geometric);
+        n.x = px * ox + py * oy + pc;
+        gather_vertex(records + 48, offset, &px, &py, &pc, &triangle);
+        n.y = px * ox + py * oy + pc;
+        gather_vertex(records + 64, offset, &px, &py, &pc, &instance_id);
+        n.z = px * ox + py * oy + pc;
+        if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) put(t, g->geometric_normal, vi_from_bits(geometric));
+        if (planes & ES_GBUFFER_TRIANGLE) put(t, g->triangle, vi_from_bits(triangle));
+        if (planes & ES_GBUFFER_INSTANCE) put(t, g->instance, vi_from_bits(instance_id));
+        if (planes & ES_GBUFFER_NORMAL) put(t, g->normal, vi_select(directed(n), es_pack_normal_v(n.x, n.y, n.z), vi_from_bits(geometric)));
+    }
+    if (planes & (ES_GBUFFER_ALBEDO | ES_GBUFFER_SURFACE | ES_GBUFFER_EMISSION)) {
+        vf surface, emission, material;
+        gather_vertex(records + 80, offset, &px, &py, &pc, &surface);
+        vf red = (px * ox + py * oy + pc) * w;
+        gather_vertex(records + 96, offset, &px, &py, &pc, &emission);
+        vf green = (px * ox + py * oy + pc) * w;
+        gather_vertex(records + 112, offset, &px, &py, &pc, &material);
+        vf blue = (px * ox + py * oy + pc) * w;
+        if (planes & ES_GBUFFER_SURFACE) put(t, g->surface, vi_from_bits(surface));
+        if (planes & ES_GBUFFER_EMISSION) put(t, g->emission, vi_from_bits(emission));
+        if (planes & ES_GBUFFER_ALBEDO) {
+            put(t, g->albedo_rg, es_pack_unorm16_v(red) | (es_pack_unorm16_v(green) << 16));
+            put(t, g->albedo_b, es_pack_unorm16_v(blue) | vi_from_bits(material));
+        }
+    }
+    vm complex = t->mask & vi_lt(tag, vi_zero()), moving = t->mask & ~complex & ~vi_eq(tag & vi_set1(ES_VISIBLE_MOVING), vi_zero());
+    vi instance = tag & vi_set1(ES_VISIBLE_INSTANCE);
+    if (planes & ES_GBUFFER_MOTION) {
+        vf motion_x = vf_zero(), motion_y = vf_zero();
+        vf z = vf_set1(job->z_offset) + vf_set1(job->z_scale) * distance;
+        for (uint32_t pending = vm_bits(moving); pending;) {
+            int32_t which = instance[__builtin_ctz(pending)];
+            vm mask = moving & vi_eq(instance, vi_set1(which));
+            vf mx, my;
+            rigid_motion(&job->instances[which], x, y, z, w, &mx, &my);
+            motion_x = vf_select(mask, mx, motion_x);
+            motion_y = vf_select(mask, my, motion_y);
+            pending &= ~vm_bits(mask);
+        }
+        put_float(t, g->motion_x, motion_x);
+        put_float(t, g->motion_y, motion_y);
+    }
+    uint32_t pending = vm_bits(complex);
+    if (!pending) return;
+    vi id = vi_gather(triangle_ids, id_numbers);
+    while (pending) {
+        int32_t which = instance[__builtin_ctz(pending)];
+        target part = {t->planes, t->at, complex & vi_eq(instance, vi_set1(which)), false};
+        resolve_complex(job, &job->instances[which], &part, id, x, y);
+        pending &= ~vm_bits(part.mask);
+    }
 }
 
 static void clear_pixels(const es_gbuffer* g, size_t at)
@@ -371,28 +611,24 @@ void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
     const uint32_t columns = g->width - (uint32_t)tile->x < ES_TILE_SIZE ? g->width - (uint32_t)tile->x : ES_TILE_SIZE;
     const uint32_t rows = g->height - (uint32_t)tile->y < ES_TILE_SIZE ? g->height - (uint32_t)tile->y : ES_TILE_SIZE;
     uint64_t pixels = 0;
+    uint32_t visible = find_visible(job, tile, rows, columns);
     for (uint32_t row = 0; row < rows; row++) {
         size_t line = (size_t)((uint32_t)tile->y + row) * g->stride + (uint32_t)tile->x;
         vf y = vf_set1((float)(tile->y + (int32_t)row) + 0.5f - 0.5f * (float)tile->height);
         for (uint32_t column = 0; column < columns; column += VW) {
-            uint32_t at = row * ES_TILE_PITCH + column;
-            vm seen = vm_gt(vf_load(tile->depth + at), vf_zero()) & vm_first((int32_t)(columns - column));
-            uint32_t pending = vm_bits(seen);
-            if (!pending) {
+            vi number = vi_load(tile->number + row * ES_TILE_PITCH + column);
+            vm seen = ~vi_eq(number, vi_zero()) & vm_first((int32_t)(columns - column));
+            uint32_t bits = vm_bits(seen);
+            if (!bits) {
                 clear_pixels(g, line + column);
                 continue;
             }
-            pixels += (uint32_t)__builtin_popcount(pending);
-            vi id = seen & vi_load(tile->id + at);
+            pixels += (uint32_t)__builtin_popcount(bits);
             vf x = vf_set1((float)(tile->x + (int32_t)column) + 0.5f - 0.5f * (float)tile->width) + vf_iota();
-            vi instance = vi_gather(job->chunk_instance, vi_shift_right_logical(id, ES_CHUNK_BITS));
-            for (bool first = true; pending; first = false) {
-                int32_t which = instance[__builtin_ctz(pending)];
-                target t = {g, line + column, seen & vi_eq(instance, vi_set1(which)), first};
-                resolve_instance(job, &job->instances[which], &t, id, x, y);
-                pending &= ~vm_bits(t.mask);
-            }
+            target t = {g, line + column, seen, true};
+            resolve_pixels(job, &t, vi_gather(job->slot, number) - vi_set1(1), number, tile->triangle_ids, x, y);
         }
     }
+    for (uint32_t i = 1; i < visible; i++) job->slot[job->slot_number[i]] = 0;
     job->pixels += pixels;
 }

@@ -1,4 +1,4 @@
-/* Triangle records into one tile's depth and ids.
+/* Triangle records into one tile's depth and numbers.
  *
  * Small triangles: setup for eight at once, then each row of a triangle is one vector. Large ones: setup once, then 8x8 blocks, eight
  * blocks at a time tested for being outside an edge, inside all edges, or behind everything drawn there. Depth is the plane through the
@@ -8,29 +8,31 @@
 #include "raster/kernels/texture_sampling.h"
 #include "platform/simd.h"
 
-/* depth greater, or equal with a smaller id; ids compare unsigned */
-VINL void put(es_tile* tile, uint32_t at, vm covered, vf z, vi id, bool with_ids)
+/* Returns the depth left there. */
+VINL vf put(float* depth, uint32_t* numbers, vm covered, vf z, vi number, bool numbered)
 {
-    vf old = vf_load(tile->depth + at);
-    if (!with_ids) {
-        vf_store(tile->depth + at, vf_max(vf_and(covered, z), old));
-        return;
+    vf old = vf_load(depth);
+    if (!numbered) {
+        vf left = vf_max(vf_and(covered, z), old);
+        vf_store(depth, left);
+        return left;
     }
-    vi old_id = vi_load(tile->id + at), flip = vi_set1(INT32_MIN);
-    vm wins = covered & (vm_gt(z, old) | (vm_eq(z, old) & vi_lt(id ^ flip, old_id ^ flip)));
-    vf_store(tile->depth + at, vf_select(wins, z, old));
-    vi_store(tile->id + at, vi_select(wins, id, old_id));
+    vm wins = covered & vm_gt(z, old);
+    vf left = vf_select(wins, z, old);
+    vf_store(depth, left);
+    vi_store(numbers, vi_select(wins, number, vi_load(numbers)));
+    return left;
 }
 
 /* ---- small --------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct small_setup {
-    int32_t c[3][VW], a[3][VW], b[3][VW], id[VW];
+    int32_t c[3][VW], a[3][VW], b[3][VW];
     float z[VW], zx[VW], zy[VW], z_low[VW], z_high[VW];
     int32_t start[VW], rows[VW];
 } small_setup;
 
-VINL void set_up_small(const es_tile* tile, const es_small_triangle* records, vi record, small_setup* s)
+VINL vi set_up_small(const es_tile* tile, const es_small_triangle* records, vi record, small_setup* s)
 {
     vi v0, v1, v2, pixel, id, z0i, z1i, z2i;
     vi_gather4(records, sizeof *records, record, &v0, &v1, &v2, &pixel);
@@ -60,34 +62,38 @@ VINL void set_up_small(const es_tile* tile, const es_small_triangle* records, vi
     vf_store(s->zy, zy * vf_set1(ES_SUBPIXELS));
     vf_store(s->z_low, vf_min(vf_min(z0, z1), z2));
     vf_store(s->z_high, vf_max(vf_max(z0, z1), z2));
-    vi_store(s->id, id);
     vi row = vi_max(py, vi_zero()), column = vi_max(px, vi_zero());
     /* rows reach to the last centre above the lowest vertex, within the tile */
     vi end = vi_min(py + ((vi_max(vi_max(y[0], y[1]), y[2]) - vi_set1(1)) >> ES_SUBPIXEL_BITS) + vi_set1(1), vi_set1(ES_TILE_SIZE));
     vi_store(s->start, row * vi_set1(ES_TILE_PITCH) + column);
     vi_store(s->rows, end - row);
+    return id;
 }
 
-VINL void draw_small(es_tile* tile, const es_segment* segment, bool with_ids)
+VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered)
 {
     const es_small_triangle* records = segment->records;
+    float* const depth = tile->depth;
+    uint32_t* const numbers = tile->number;
+    uint32_t next_number = tile->next_number;
     vi iota = vi_iota();
     vf iota_f = vf_iota();
     for (uint32_t first = 0; first < segment->count; first += VW) {
         uint32_t n = segment->count - first < VW ? segment->count - first : VW;
         small_setup s;
         /* lists are padded to eight; what is beyond the end is not an index */
-        set_up_small(tile, records, vm_first((int32_t)n) & vi_load(segment->list + first), &s);
+        vi ids = set_up_small(tile, records, vm_first((int32_t)n) & vi_load(segment->list + first), &s);
+        if (numbered) vi_store(tile->triangle_ids + next_number, ids);
         for (uint32_t t = 0; t < n; t++) {
             vi e0 = vi_set1(s.c[0][t]) + vi_set1(s.a[0][t]) * iota, b0 = vi_set1(s.b[0][t]);
             vi e1 = vi_set1(s.c[1][t]) + vi_set1(s.a[1][t]) * iota, b1 = vi_set1(s.b[1][t]);
             vi e2 = vi_set1(s.c[2][t]) + vi_set1(s.a[2][t]) * iota, b2 = vi_set1(s.b[2][t]);
             vf z = vf_set1(s.z[t]) + vf_set1(s.zx[t]) * iota_f, zy = vf_set1(s.zy[t]);
             vf low = vf_set1(s.z_low[t]), high = vf_set1(s.z_high[t]);
-            vi id = vi_set1(s.id[t]);
+            vi number = vi_set1((int32_t)(next_number + t));
             uint32_t at = (uint32_t)s.start[t];
             for (int32_t row = s.rows[t]; row > 0; row--) {
-                put(tile, at, vi_gt(e0 | e1 | e2, vi_set1(-1)), vf_clamp(z, low, high), id, with_ids);
+                put(depth + at, numbers + at, vi_gt(e0 | e1 | e2, vi_set1(-1)), vf_clamp(z, low, high), number, numbered);
                 e0 += b0;
                 e1 += b1;
                 e2 += b2;
@@ -95,12 +101,14 @@ VINL void draw_small(es_tile* tile, const es_segment* segment, bool with_ids)
                 at += ES_TILE_PITCH;
             }
         }
+        next_number += n;
     }
+    tile->next_number = next_number;
 }
 
 void ES_KERNEL(es_draw_small)(es_tile* tile, const es_segment* segment)
 {
-    if (tile->id) draw_small(tile, segment, true);
+    if (tile->number) draw_small(tile, segment, true);
     else draw_small(tile, segment, false);
 }
 
@@ -219,7 +227,7 @@ static vm alpha_passes(const es_tile* tile, const masked_setup* s, int32_t colum
     return active & ~vm_lt(alpha, vf_set1(s->material->alpha_cutoff));
 }
 
-VINL bool draw_blocks(es_tile* tile, const large_setup* s, uint32_t triangle_id, const masked_setup* mask, bool with_ids)
+VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* mask, bool numbered)
 {
     vi iota = vi_iota(), zero = vi_zero();
     vi a0 = vi_set1(s->a[0]), a1 = vi_set1(s->a[1]), a2 = vi_set1(s->a[2]), b0 = vi_set1(s->b[0]), b1 = vi_set1(s->b[1]), b2 = vi_set1(s->b[2]);
@@ -237,7 +245,9 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, uint32_t triangle_id,
      * every pixel would lose, so skipping cannot change a bit */
     float margin = 2e-6f * ((s->z < 0 ? -s->z : s->z) + 64.0f * (steep_x + steep_y));
     vf z_top = vf_set1((s->zx > 0 ? 7 * s->zx : 0) + (s->zy > 0 ? 7 * s->zy : 0) + margin);
-    vi id = vi_set1((int32_t)triangle_id);
+    float* const depth = tile->depth;
+    uint32_t* const numbers = tile->number;
+    vi number = vi_set1((int32_t)tile->next_number);
     bool any = false;
     for (int32_t by = s->first_row >> 3; by <= s->last_row >> 3; by++) {
         vi y8 = vi_set1(8 * by);
@@ -263,8 +273,7 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, uint32_t triangle_id,
             vf least = vf_set1(2.0f);
             if (!mask && (inside_bits >> bx & 1)) {
                 for (int row = 0; row < 8; row++, at += ES_TILE_PITCH) {
-                    put(tile, at, vm_all_lanes(), vf_clamp(z, low, high), id, with_ids);
-                    least = vf_min(least, vf_load(tile->depth + at));
+                    least = vf_min(least, put(depth + at, numbers + at, vm_all_lanes(), vf_clamp(z, low, high), number, numbered));
                     z += zy;
                 }
             } else {
@@ -273,11 +282,10 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, uint32_t triangle_id,
                     vm covered = vi_gt(f0 | f1 | f2, vi_set1(-1));
                     vf d = vf_clamp(z, low, high);
                     if (mask) {
-                        covered &= vm_ge(d, vf_load(tile->depth + at));
+                        covered &= vm_gt(d, vf_load(depth + at));
                         if (vm_any(covered)) covered = alpha_passes(tile, mask, 8 * bx, 8 * by + row, covered);
                     }
-                    put(tile, at, covered, d, id, with_ids);
-                    least = vf_min(least, vf_load(tile->depth + at));
+                    least = vf_min(least, put(depth + at, numbers + at, covered, d, number, numbered));
                     f0 += b0;
                     f1 += b1;
                     f2 += b2;
@@ -301,7 +309,9 @@ void ES_KERNEL(es_draw_large)(es_tile* tile, const es_segment* segment)
     for (uint32_t i = 0; i < segment->count; i++) {
         const es_large_triangle* r = &records[segment->list[i]];
         large_setup s = set_up_large(tile, r);
-        bool any = tile->id ? draw_blocks(tile, &s, r->id, NULL, true) : draw_blocks(tile, &s, r->id, NULL, false);
+        if (tile->number) tile->triangle_ids[tile->next_number] = r->id;
+        bool any = tile->number ? draw_blocks(tile, &s, NULL, true) : draw_blocks(tile, &s, NULL, false);
+        tile->next_number++;
         tile->hidden += !any;
     }
 }
@@ -313,7 +323,9 @@ void ES_KERNEL(es_draw_masked)(es_tile* tile, const es_segment* segment)
         const es_large_triangle* r = &records[segment->list[i]];
         large_setup s = set_up_large(tile, r);
         masked_setup mask = set_up_masked(tile, r->id);
-        bool any = tile->id ? draw_blocks(tile, &s, r->id, &mask, true) : draw_blocks(tile, &s, r->id, &mask, false);
+        if (tile->number) tile->triangle_ids[tile->next_number] = r->id;
+        bool any = tile->number ? draw_blocks(tile, &s, &mask, true) : draw_blocks(tile, &s, &mask, false);
+        tile->next_number++;
         tile->hidden += !any;
     }
 }
