@@ -7,7 +7,7 @@
 static double score(const bench_row* row)
 {
     if (row->judge == BENCH_RATIO_AT_LEAST) return row->ratio / row->must;
-    if (row->judge == BENCH_VALUE_AT_MOST) return row->must / fmax(row->value, row->must * 1e-3);
+    if (row->judge == BENCH_VALUE_AT_MOST && !isnan(row->value)) return row->must / fmax(row->value, row->must * 1e-3);
     return NAN;
 }
 
