@@ -15,11 +15,11 @@
  *
  * so the constant can be clamped to ±2^30 without changing any sign, and everything stays below 2^30 + 2^29 < 2^31.
  *
- * Small triangles (at most 8 by 64 pixels) are kept in 16 bits relative to the first pixel centre they may cover; that pixel
+ * Small triangles (at most 32 by 64 pixels) are kept in 16 bits relative to the first pixel centre they may cover; that pixel
  * is moved into the view, by at most the triangle's own size:
  *
- *   |x| <= 8 * 256 + 255 < 2^12,  |y| <= 64 * 256 + 255 < 2^15;   |A| <= 2^14,  |B| <= 2^11
- *   |A * x + B * y|           <= 2^26 + 2^26              < 2^31
+ *   |x| <= 32 * 256 + 255 < 2^14,  |y| <= 64 * 256 + 255 < 2^15;   |A| <= 2^14,  |B| <= 2^13
+ *   |A * x + B * y|           <= 2^28 + 2^28              < 2^31
  */
 #ifndef EARTHSHINE_RASTER_LIMITS_H
 #define EARTHSHINE_RASTER_LIMITS_H
@@ -38,7 +38,7 @@ enum {
     ES_TILE_FRONT = 16,                        /* words readable before a tile's numbers */
     ES_TILE_VISIBLE_MAX = ES_TILE_SIZE * ES_TILE_SIZE + 8, /* as many triangles as pixels, slot 0 for none, eight at a time */
 
-    ES_SMALL_WIDTH = 8 * ES_SUBPIXELS,         /* extents up to which a triangle is drawn row by row, one vector each */
+    ES_SMALL_WIDTH = 32 * ES_SUBPIXELS,        /* extents up to which a triangle is drawn in columns of eight pixels, row by row */
     ES_SMALL_HEIGHT = 64 * ES_SUBPIXELS,
 
     ES_CHUNK_BITS = 10,                        /* a triangle's id: chunk in the view << 10 | triangle in the chunk */

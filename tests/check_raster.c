@@ -232,12 +232,15 @@ static void random_records(tile_input* in)
         for (;;) {
             es_small_triangle t = {.id = random_bits(), .z0 = z[0], .z1 = z[1], .z2 = z[2]};
             int32_t w = 1 + (int32_t)(random_bits() % ES_SMALL_WIDTH), h = 1 + (int32_t)(random_bits() % (i % 4 ? 2048 : ES_SMALL_HEIGHT));
-            int32_t x[3], y[3], px = in->tile.x + (int32_t)(random_bits() % 71) - 7, py = in->tile.y + (int32_t)(random_bits() % 71) - 7, dx = (int32_t)(random_bits() % 256), dy = (int32_t)(random_bits() % 256);
+            int32_t x[3], y[3], px = in->tile.x + (int32_t)(random_bits() % 95) - 31, py = in->tile.y + (int32_t)(random_bits() % 95) - 31, dx = (int32_t)(random_bits() % 256), dy = (int32_t)(random_bits() % 256);
             for (int k = 0; k < 3; k++) x[k] = (int32_t)(random_bits() % (uint32_t)(w + 1)) - dx, y[k] = (int32_t)(random_bits() % (uint32_t)(h + 1)) - dy;
             int32_t area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
             int32_t lowest = y[0] > y[1] ? y[0] : y[1];
             lowest = lowest > y[2] ? lowest : y[2];
-            if (area <= 0 || px < 0 || py < 0 || lowest <= 0 || py + ((lowest - 1) >> 8) < in->tile.y || px + 8 <= in->tile.x) continue;
+            int32_t rightmost = x[0] > x[1] ? x[0] : x[1];
+            rightmost = rightmost > x[2] ? rightmost : x[2];
+            if (area <= 0 || px < 0 || py < 0 || lowest <= 0 || rightmost <= 0 || py + ((lowest - 1) >> 8) < in->tile.y || px + ((rightmost - 1) >> 8) < in->tile.x) continue;
+            if (px >= in->tile.x + 64 || py >= in->tile.y + 64) continue;
             t.x0 = (int16_t)x[0], t.x1 = (int16_t)x[1], t.x2 = (int16_t)x[2];
             t.y0 = (int16_t)y[0], t.y1 = (int16_t)y[1], t.y2 = (int16_t)y[2];
             t.px = (uint16_t)px, t.py = (uint16_t)py;
@@ -307,7 +310,6 @@ static void check_coverage(const tile_input* in, int kind, uint32_t count, const
                     vx[0] = t->x0, vx[1] = t->x1, vx[2] = t->x2, vy[0] = t->y0, vy[1] = t->y1, vy[2] = t->y2;
                     cx = ((int64_t)in->tile.x + x - t->px) * 256, cy = ((int64_t)in->tile.y + y - t->py) * 256;
                     low = fminf(fminf(t->z0, t->z1), t->z2);
-                    if (cx < 0 || cy < 0 || cx >= 8 * 256) continue; /* outside what the bin stage says the triangle can cover */
                 } else {
                     const es_large_triangle* t = &in->large[in->list[i]];
                     vx[0] = t->x0, vx[1] = t->x1, vx[2] = t->x2, vy[0] = t->y0, vy[1] = t->y1, vy[2] = t->y2;

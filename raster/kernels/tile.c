@@ -1,6 +1,6 @@
 /* Triangle records into one tile's depth and numbers.
  *
- * Small triangles: setup for eight at once, then each row of a triangle is one vector. Large ones: setup once, then 8x8 blocks, eight
+ * Small triangles: setup for eight at once, then columns of eight pixels, each row one vector. Large ones: setup once, then 8x8 blocks, eight
  * blocks at a time tested for being outside an edge, inside all edges, or behind everything drawn there. Depth is the plane through the
  * three vertices, kept within their range. All edge arithmetic is exact (raster/limits.h).
  */
@@ -29,7 +29,7 @@ VINL vf put(float* depth, uint32_t* numbers, vm covered, vf z, vi number, bool n
 typedef struct small_setup {
     int32_t c[3][VW], a[3][VW], b[3][VW];
     float z[VW], zx[VW], zy[VW], z_low[VW], z_high[VW];
-    int32_t start[VW], rows[VW];
+    int32_t start[VW], rows[VW], columns[VW]; /* columns: of eight pixels */
 } small_setup;
 
 VINL vi set_up_small(const es_tile* tile, const es_small_triangle* records, vi record, small_setup* s)
@@ -67,6 +67,8 @@ VINL vi set_up_small(const es_tile* tile, const es_small_triangle* records, vi r
     vi end = vi_min(py + ((vi_max(vi_max(y[0], y[1]), y[2]) - vi_set1(1)) >> ES_SUBPIXEL_BITS) + vi_set1(1), vi_set1(ES_TILE_SIZE));
     vi_store(s->start, row * vi_set1(ES_TILE_PITCH) + column);
     vi_store(s->rows, end - row);
+    vi right = vi_min(px + ((vi_max(vi_max(x[0], x[1]), x[2]) - vi_set1(1)) >> ES_SUBPIXEL_BITS) + vi_set1(1), vi_set1(ES_TILE_SIZE));
+    vi_store(s->columns, (right - column + vi_set1(7)) >> 3);
     return id;
 }
 
@@ -91,14 +93,25 @@ VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered)
             vf z = vf_set1(s.z[t]) + vf_set1(s.zx[t]) * iota_f, zy = vf_set1(s.zy[t]);
             vf low = vf_set1(s.z_low[t]), high = vf_set1(s.z_high[t]);
             vi number = vi_set1((int32_t)(next_number + t));
-            uint32_t at = (uint32_t)s.start[t];
-            for (int32_t row = s.rows[t]; row > 0; row--) {
-                put(depth + at, numbers + at, vi_gt(e0 | e1 | e2, vi_set1(-1)), vf_clamp(z, low, high), number, numbered);
-                e0 += b0;
-                e1 += b1;
-                e2 += b2;
-                z += zy;
-                at += ES_TILE_PITCH;
+            uint32_t start = (uint32_t)s.start[t];
+            for (int32_t column = s.columns[t]; column > 0; column--) {
+                vi f0 = e0, f1 = e1, f2 = e2;
+                vf d = z;
+                uint32_t at = start;
+                for (int32_t row = s.rows[t]; row > 0; row--) {
+                    put(depth + at, numbers + at, vi_gt(f0 | f1 | f2, vi_set1(-1)), vf_clamp(d, low, high), number, numbered);
+                    f0 += b0;
+                    f1 += b1;
+                    f2 += b2;
+                    d += zy;
+                    at += ES_TILE_PITCH;
+                }
+                if (column == 1) break;
+                e0 += vi_set1(8 * s.a[0][t]);
+                e1 += vi_set1(8 * s.a[1][t]);
+                e2 += vi_set1(8 * s.a[2][t]);
+                z += vf_set1(8 * s.zx[t]);
+                start += VW;
             }
         }
         next_number += n;
