@@ -19,20 +19,31 @@ static bool touches(const es_large_triangle* t, uint32_t tile_x, uint32_t tile_y
 
 typedef struct list_state { es_raster_worker* worker; uint32_t touched_count, pairs; } list_state;
 
-static void count_key(list_state* s, uint32_t key)
+/* without a branch: whether a tile is new to the chunk cannot be predicted */
+static inline void count_key(list_state* s, uint32_t key)
 {
-    if (s->worker->key_count[key]++ == 0) s->worker->touched[s->touched_count++] = key;
+    uint32_t count = s->worker->key_count[key];
+    s->worker->touched[s->touched_count] = key;
+    s->touched_count += count == 0;
+    s->worker->key_count[key] = count + 1;
     s->pairs++;
 }
+
+static inline bool one_tile(es_tile_rect r) { return r.x0 == r.x1 && r.y0 == r.y1; }
 
 bool es_list_chunk(es_rasterizer* rasterizer, es_raster_worker* worker, const es_bin_job* job, bool masked, es_chunk* chunk)
 {
     const uint32_t tiles_x = rasterizer->tiles_x, large_kind = masked ? ES_RECORDS_MASKED : ES_RECORDS_LARGE;
+    uint32_t* const key_count = worker->key_count;
     list_state s = {worker, 0, 0};
     chunk->segments = NULL;
     chunk->segment_count = 0;
     for (uint32_t i = 0; i < job->small_count; i++) {
         es_tile_rect r = job->small_rects[i];
+        if (one_tile(r)) {
+            count_key(&s, (r.y0 * tiles_x + r.x0) * ES_RECORD_KINDS + ES_RECORDS_SMALL);
+            continue;
+        }
         for (uint32_t y = r.y0; y <= r.y1; y++)
             for (uint32_t x = r.x0; x <= r.x1; x++) count_key(&s, (y * tiles_x + x) * ES_RECORD_KINDS + ES_RECORDS_SMALL);
     }
@@ -62,6 +73,10 @@ bool es_list_chunk(es_rasterizer* rasterizer, es_raster_worker* worker, const es
     }
     for (uint32_t i = 0; i < job->small_count; i++) {
         es_tile_rect r = job->small_rects[i];
+        if (one_tile(r)) {
+            list[key_count[(r.y0 * tiles_x + r.x0) * ES_RECORD_KINDS + ES_RECORDS_SMALL]++] = i;
+            continue;
+        }
         for (uint32_t y = r.y0; y <= r.y1; y++)
             for (uint32_t x = r.x0; x <= r.x1; x++) list[worker->key_count[(y * tiles_x + x) * ES_RECORD_KINDS + ES_RECORDS_SMALL]++] = i;
     }

@@ -136,7 +136,7 @@ typedef enum es_gbuffer_plane {
     ES_GBUFFER_ALBEDO = 1 << 3,           /* albedo_rg: r low, g high; albedo_b: b low, material index high; unsigned 16-bit linear */
     ES_GBUFFER_SURFACE = 1 << 4,          /* metallic | roughness << 8 | specular << 16 | es_surface_model << 24; PHONG: byte 1 is exponent * 5 */
     ES_GBUFFER_EMISSION = 1 << 5,         /* shared-exponent RGB9E5 */
-    ES_GBUFFER_MOTION = 1 << 6,           /* two floats: pixel position now minus last frame's (Knecht §3.5.1), x then y plane */
+    ES_GBUFFER_MOTION = 1 << 6,           /* two floats: pixel position now minus last frame's (Knecht §3.5.1), x then y plane; 65536 each where it was behind the eye */
     ES_GBUFFER_INSTANCE = 1 << 7,         /* instance id + 1 */
     ES_GBUFFER_TRIANGLE = 1 << 8,         /* triangle index in its mesh + 1 */
     ES_GBUFFER_ALL = (1 << 9) - 1

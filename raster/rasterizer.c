@@ -12,7 +12,7 @@ static void free_worker(es_context* context, es_raster_worker* w)
     es_release(context, w->large_rects, sizeof *w->large_rects * ES_CHUNK_TRIANGLES * ES_CLIP_PIECES_MAX);
     es_release(context, w->small_rects, sizeof *w->small_rects * ES_CHUNK_TRIANGLES);
     es_release(context, w->key_count, sizeof *w->key_count * w->key_capacity);
-    es_release(context, w->touched, sizeof *w->touched * w->key_capacity);
+    es_release(context, w->touched, sizeof *w->touched * (w->key_capacity + 1));
     es_release(context, w->tile_depth, sizeof *w->tile_depth * (ES_TILE_WORDS + 8));
     es_release(context, w->tile_number, sizeof *w->tile_number * (ES_TILE_FRONT + ES_TILE_WORDS + 8));
     es_release(context, w->visible, sizeof *w->visible * ES_TILE_VISIBLE_MAX);
@@ -223,11 +223,11 @@ static bool run_stages(draw* d, const es_draw_list* list, uint32_t planes, es_ra
         w->failed = false;
         if (w->key_capacity < keys) {
             es_release(context, w->key_count, sizeof *w->key_count * w->key_capacity);
-            es_release(context, w->touched, sizeof *w->touched * w->key_capacity);
+            es_release(context, w->touched, sizeof *w->touched * (w->key_capacity + 1));
             w->key_capacity = 0;
             w->touched = NULL;
             if (!(w->key_count = es_allocate_zero(context, keys * sizeof *w->key_count))) return false;
-            if (!(w->touched = es_allocate(context, keys * sizeof *w->touched))) {
+            if (!(w->touched = es_allocate(context, (keys + 1) * sizeof *w->touched))) {
                 es_release(context, w->key_count, keys * sizeof *w->key_count);
                 w->key_count = NULL;
                 return false;

@@ -37,11 +37,12 @@ void ES_KERNEL(es_bin_triangles)(es_bin_job* job)
         vm active = vm_first((int32_t)n);
         vi triangle = vi_set1((int32_t)first) + (active & vi_iota());
         vi index[3], next;
-        vi_gather4(job->indices, 12, triangle, &index[0], &index[1], &index[2], &next);
+        /* offsets are multiplied by the stride here, in one go: lane by lane it costs eight shifts a gather */
+        vi_gather4(job->indices, 1, triangle * vi_set1(12), &index[0], &index[1], &index[2], &next);
         triangle8 t;
         for (int k = 0; k < 3; k++) {
             vi z;
-            vi_gather4(job->vertices, sizeof(es_snapped_vertex), index[k], &t.x[k], &t.y[k], &z, &t.flags[k]);
+            vi_gather4(job->vertices, 1, index[k] << 4, &t.x[k], &t.y[k], &z, &t.flags[k]);
             t.z[k] = vf_from_bits(z);
         }
         vi any = t.flags[0] | t.flags[1] | t.flags[2], all = t.flags[0] & t.flags[1] & t.flags[2];
