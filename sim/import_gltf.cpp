@@ -12,6 +12,7 @@
 #include <cstring>
 #include <map>
 #include <new>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ namespace
  * its own: both keep a file of a few kilobytes from asking for all memory where the context has no cap. */
 constexpr uint64_t max_vertices = 1ull << 27;
 constexpr uint64_t max_zero_elements = 1ull << 24;
+/* Accessor elements that are read in all: a bound on time, since a few bytes can name the same accessor once more. The
+ * vertices allowed above, with eight attributes each. */
+constexpr uint64_t max_elements_read = 1ull << 30;
 /* Shear below this (cosine between two axes) is what rounding leaves in a decomposed matrix. */
 constexpr double shear_tolerance = 1e-3;
 
@@ -216,7 +220,7 @@ class importer
     std::vector<es_material> materials;     /* null: not yet made; the last is glTF's default material */
     std::map<std::pair<int, bool>, es_texture> textures; /* by image and sRGB */
     std::map<std::vector<int64_t>, es_mesh> meshes;      /* by everything a primitive's vertices come from */
-    uint64_t vertex_total = 0;
+    uint64_t vertex_total = 0, elements_read = 0;
     size_t instance_total = 0;
     left_out left;
 
@@ -441,6 +445,15 @@ class importer
 
     const elements& accessor(int number, const std::string& where) { return element_list[index(number, element_list.size(), where)]; }
 
+    void spend(uint64_t count, const std::string& where)
+    {
+        elements_read += count;
+        if (elements_read > max_elements_read) {
+            refuse(ES_FILE_UNSUPPORTED, "%s: reading it takes more than %llu accessor elements", where.c_str(),
+                static_cast<unsigned long long>(max_elements_read));
+        }
+    }
+
     /* All elements as floats, `components` each; `where` names the use for messages. Values must be finite and within 1e9. */
     void read_floats(int number, int components, const std::string& where, list<float>& out)
     {
@@ -449,6 +462,7 @@ class importer
             refuse(ES_FILE_DAMAGED, "%s: accessors[%d] has %d components of type %d, %d of type 5126 or a normalised integer are needed",
                 where.c_str(), number, e.components, e.type, components);
         }
+        spend(e.count, where);
         size_t n = static_cast<size_t>(components), bytes = component_bytes(e.type);
         out.assign(e.count * n, 0.0f);
         if (e.data) {
@@ -480,6 +494,7 @@ class importer
                                      e.type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)) {
             refuse(ES_FILE_DAMAGED, "%s: accessors[%d] must be SCALAR of type 5121, 5123 or 5125", where.c_str(), number);
         }
+        spend(e.count, where);
         out.assign(e.count, 0);
         size_t bytes = component_bytes(e.type);
         for (size_t i = 0; e.data && i < e.count; i++) { out[i] = load_unsigned(e.data + i * e.stride, e.type); }
@@ -1068,6 +1083,7 @@ class importer
                 refuse(ES_FILE_DAMAGED, "%s.inverseBindMatrices: has %zu matrices, there are %zu joints", skin_where.c_str(), bind.size() / 16, joint_count);
             }
         }
+        spend(joint_count, skin_where);
         list<es_mat4> joints{counted<es_mat4>(context)};
         for (size_t j = 0; j < joint_count; j++) {
             size_t node = index(from.joints[j], model.nodes.size(), skin_where + ".joints");
@@ -1440,7 +1456,7 @@ class importer
         const tinygltf::Animation& from = model.animations[a];
         std::map<int, list<float>> data; /* of accessors, by number */
         std::vector<es_clip_channel> channels;
-        std::vector<std::pair<size_t, es_clip_path>> targets;
+        std::set<std::pair<size_t, es_clip_path>> targets;
         for (size_t c = 0; c < from.channels.size(); c++) {
             const tinygltf::AnimationChannel& channel = from.channels[c];
             std::string where = at("animations", a) + ".channels[" + std::to_string(c) + "]";
@@ -1463,11 +1479,9 @@ class importer
                 continue;
             }
             if (nodes[node].id == 0) { continue; } /* of another scene */
-            std::pair<size_t, es_clip_path> target(node, out.path);
-            if (std::find(targets.begin(), targets.end(), target) != targets.end()) {
+            if (!targets.emplace(node, out.path).second) {
                 refuse(ES_FILE_DAMAGED, "%s.target: another channel of the animation has the same node and path", where.c_str());
             }
-            targets.push_back(target);
             std::string sampler_where = at("animations", a) + ".samplers[" + std::to_string(channel.sampler) + "]";
             if (sampler.interpolation == "STEP") {
                 out.interpolation = ES_INTERPOLATE_STEP;

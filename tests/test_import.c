@@ -888,6 +888,24 @@ static void the_memory_cap_holds(void** state)
     fixture.context = normal;
 }
 
+/* A few kilobytes that name the same sixteen million elements a hundred times: an end within the bound on time. */
+static void small_files_cannot_ask_for_much(void** state)
+{
+    char json[16384];
+    int used = sprintf(json, "{" ASSET "," SCENE1 ",'nodes':[{'mesh':0}],'accessors':[{'componentType':5126,'count':16777216,'type':'VEC3'}],"
+        "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':0}");
+    for (int i = 0; i < 100; i++) { used += sprintf(json + used, ",{'POSITION':0}"); }
+    sprintf(json + used, "]}]}]}");
+    es_context* normal = fixture.context;
+    fixture.context = new_context(1u << 30);
+    refuse(ES_FILE_UNSUPPORTED, "accessor elements", json, NULL, 0);
+    es_context_destroy(fixture.context);
+    fixture.context = new_context(1u << 26);
+    refuse(ES_MEMORY_CAP, "", json, NULL, 0);
+    es_context_destroy(fixture.context);
+    fixture.context = normal;
+}
+
 /* ---- damaged at random ------------------------------------------------------------------------------------------------------------- */
 
 static uint64_t random_state = 0x9e3779b97f4a7c15ull;
@@ -1128,6 +1146,7 @@ int main(void)
         cmocka_unit_test(refusals_of_accessors),
         cmocka_unit_test(refusals_of_geometry),
         cmocka_unit_test(the_memory_cap_holds),
+        cmocka_unit_test(small_files_cannot_ask_for_much),
         cmocka_unit_test(damaged_files_do_no_harm),
         cmocka_unit_test(shared_assets),
         cmocka_unit_test(the_same_world_every_time),
