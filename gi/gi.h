@@ -37,6 +37,8 @@ typedef struct es_renderer_settings {
     uint32_t light_size;             /* texels of the light G-buffer's side, a power of two */
     uint32_t seed;                   /* of the sample sets */
     float geometry_bound;            /* 1/m²: cos cos / d² of a pair is cut off here (Knecht eq. 4.7 with 1/bound = d²min) */
+    float spread;                    /* how far a light's own area softens it close by: 0 a point, 1 a disc of that area */
+    bool view_importance;            /* more lights where they matter for what the camera sees */
     bool glossy_vpls;                /* VPLs emit their surface's glossy lobe too (Knecht §3.4.3) */
     /* imperfect shadow maps */
     uint32_t ism_size;               /* texels of a side: 32, 64, 128, 256 */
@@ -47,6 +49,7 @@ typedef struct es_renderer_settings {
     float push_threshold;
     uint32_t pull_push_levels;       /* thesis: 2 */
     float ism_bias;                  /* share of the scene's extent */
+    float ism_slope_bias;            /* share of the scene's extent, over the cosine at the pixel; about the width of a splat */
     uint32_t classic_size;           /* texels of a classic map's side */
     /* interleaved shading and filter */
     uint32_t interleave;             /* n of the n × n pattern, 1 … 16 */

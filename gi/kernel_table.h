@@ -8,12 +8,14 @@
 #include "gi/gi.h"
 #include "gi/pixel_rays.h"
 #include "gi/shade.h"
+#include "gi/view_importance.h"
 #include "gi/vpl.h"
 
 /* X(name, arguments) */
 #define ES_GI_KERNELS(X)                                                                                         \
     X(place_points, (const es_raster_mesh* mesh, const es_mat4* transform, const uint32_t* triangle,             \
                      const uint32_t* barycentric, uint32_t count, float* x, float* y, float* z))                 \
+    X(view_importance, (const es_receivers* receivers, const es_sender* senders, uint32_t count, float* result)) \
     /* rows [row_begin, row_end) */                                                                              \
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \

@@ -278,11 +278,19 @@ static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
     es_plan_begin(plan, ES_PASS_VPLS);
     es_plan_reads_pass(plan, ES_PASS_LIGHT_VIEWS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
-    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy};
+    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy, r->settings.view_importance};
     es_plan_reads(plan, words, sizeof words);
+    if (r->settings.view_importance) es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     if (!es_plan_run(plan, ES_PASS_VPLS)) return ES_OK;
     es_result result = reserve_vpls(r, request.count);
-    for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i]);
+    es_arena_reset(&r->arena);
+    es_receivers* receivers = r->settings.view_importance && !result ? es_arena_allocate(&r->arena, sizeof *receivers) : NULL;
+    if (receivers) {
+        /* about the squared distance between the grid's pixels on surfaces half the scene away */
+        float softening = in->extent * 0.004f;
+        es_receivers_collect(receivers, &r->gbuffer, &r->rays, softening * softening);
+    }
+    for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i], receivers);
     if (!result) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->vpl_count);
     if (!result) es_plan_done(plan, ES_PASS_VPLS, r->vpl_count);
     return result;
@@ -397,14 +405,14 @@ static es_result pass_shading(es_renderer* r, const frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VPLS);
     es_plan_reads_pass(plan, ES_PASS_ISM);
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
-    float numbers[] = {s->ism_bias, s->geometry_bound, (float)s->interleave, in->extent, r->has_specular};
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, (float)s->interleave, in->extent, r->has_specular};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = es_planes_resize(r->context, &r->irradiance, &r->gbuffer);
     if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, &r->gbuffer);
     if (result) return result;
     es_shade_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
-        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .geometry_bound = s->geometry_bound, .interleave = s->interleave};
+        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .geometry_bound = s->geometry_bound, .interleave = s->interleave};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = r->irradiance.at[k];
         job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;

@@ -19,7 +19,9 @@ static const es_setting renderer_table[] = {
     {"vpl.count", ES_SETTING_INT, "1024", 0, 16384, NULL, "virtual point lights per frame", AT(vpls)},
     {"vpl.light-size", ES_SETTING_INT, "256", 8, 2048, NULL, "texels of a light G-buffer's side, a power of two", AT(light_size)},
     {"vpl.seed", ES_SETTING_INT, "0", 0, 1000000, NULL, "offset into the Halton sequence", AT(seed)},
-    {"vpl.bound", ES_SETTING_FLOAT, "20", 0.001, 1000000, NULL, "largest geometry term cos cos / d², 1/m²", AT(geometry_bound)},
+    {"vpl.bound", ES_SETTING_FLOAT, "1000", 0.001, 1000000, NULL, "largest geometry term cos cos / d², 1/m²", AT(geometry_bound)},
+    {"vpl.spread", ES_SETTING_FLOAT, "2", 0, 100, NULL, "how far a light's own area softens it close by: 0 a point, 1 a disc", AT(spread)},
+    {"vpl.view-importance", ES_SETTING_BOOL, "true", 0, 1, NULL, "more lights where they matter for what the camera sees", AT(view_importance)},
     {"vpl.glossy", ES_SETTING_BOOL, "true", 0, 1, NULL, "virtual point lights emit their surface's glossy lobe too", AT(glossy_vpls)},
 
     {"ism.size", ES_SETTING_INT, "128", 32, 256, NULL, "texels of an imperfect shadow map's side: 32, 64, 128 or 256", AT(ism_size)},
@@ -27,9 +29,10 @@ static const es_setting renderer_table[] = {
     {"ism.pool", ES_SETTING_INT, "1048576", 64, 16777216, NULL, "points that stand for the scene", AT(ism_pool)},
     {"ism.pull-push", ES_SETTING_BOOL, "true", 0, 1, NULL, "fill the holes between points", AT(pull_push)},
     {"ism.pull-threshold", ES_SETTING_FLOAT, "0.05", 0, 1, NULL, "largest depth difference that is averaged, share of the scene's extent", AT(pull_threshold)},
-    {"ism.push-threshold", ES_SETTING_FLOAT, "0.05", 0, 1, NULL, "largest depth difference that is kept, share of the scene's extent", AT(push_threshold)},
+    {"ism.push-threshold", ES_SETTING_FLOAT, "0.1", 0, 1, NULL, "largest depth difference that is kept, share of the scene's extent", AT(push_threshold)},
     {"ism.levels", ES_SETTING_INT, "2", 1, 4, NULL, "pull-push levels", AT(pull_push_levels)},
-    {"ism.bias", ES_SETTING_FLOAT, "0.01", 0, 1, NULL, "depth bias of the visibility test, share of the scene's extent", AT(ism_bias)},
+    {"ism.bias", ES_SETTING_FLOAT, "0", 0, 1, NULL, "depth bias of the visibility test, share of the scene's extent", AT(ism_bias)},
+    {"ism.slope-bias", ES_SETTING_FLOAT, "0.026", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(ism_slope_bias)},
     {"classic.size", ES_SETTING_INT, "256", 32, 1024, NULL, "texels of a classic map's side, a power of two", AT(classic_size)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},

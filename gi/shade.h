@@ -4,8 +4,13 @@
  * the result is multiplied by n², so that the mean over any n × n pixels has every light once. Per light, with d from light to
  * pixel, r = |d|:
  *
- *     G = min(cos_light · cos_pixel / r², geometry_bound)      Knecht eq. 4.7, the bound being 1 / d²min
- *     V = r <= map(d) + bias
+ *     G = min(cos_light · cos_pixel / (r² + spread · A / pi), geometry_bound)      Knecht eq. 4.7, the bound being 1 / d²min
+ *     V = r <= map(d) + bias + slope_bias / cos_pixel
+ *
+ * A is the area the light stands for: with spread 1 a disc of that area sends what a point would send too much of close by
+ * (the point-to-disc form factor of Wallace, Elmquist and Haines 1989). Where lights lie close together, as they do near their
+ * source, little is softened. A map's depth holds for a patch as wide as a splat; on a pixel's surface tilted by the angle a
+ * depths within it differ by width · tan a, which slope_bias allows for.
  *     irradiance += n² · flux / pi · G · V
  *
  * The pixel's own diffuse reflectance, albedo · (1 - metallic) / pi, is applied after the filter. Lobes (gi/surface.h): a glossy light
@@ -29,7 +34,8 @@ typedef struct es_shade_job {
     const uint16_t* maps;          /* map v at maps + v · map_size²; NULL: everything sees everything */
     uint32_t map_size;
     float far_distance;            /* of the maps */
-    float bias;                    /* metres */
+    float bias, slope_bias;        /* metres */
+    float spread;
     float geometry_bound;          /* 1/m² */
     uint32_t interleave;           /* n, 1 … ES_INTERLEAVE_MAX */
     /* out, rows of gbuffer->stride; 0 where nothing is seen */
@@ -44,6 +50,7 @@ es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job
 typedef struct es_shade_light {
     float position[3], normal[3], tangent[3], bitangent[3];
     float color[3];                /* n² · flux / pi */
+    float spread;                  /* spread · A / pi, m² */
     float power[3];                /* n² · power; what follows is used when glossy */
     float incident[3], specular_color[3], roughness;
     uint32_t model;

@@ -13,6 +13,7 @@ typedef struct es_vpl_record {
     float power[3];      /* incoming, W */
     float incident[3];   /* unit, from the point towards where the light came from */
     float specular_color[3]; /* Fresnel reflectance at normal incidence (GGX), lobe albedo (Phong) */
+    float area;          /* m² of surface that the light stands for */
     float roughness;     /* GGX roughness; Phong: exponent */
     uint32_t model;      /* es_surface_model */
     bool glossy;         /* has a lobe besides the diffuse part worth evaluating */

@@ -3,6 +3,7 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
+#include "gi/kernel_table.h"
 #include "gi/surface.h"
 #include "raster/pack.h"
 
@@ -24,6 +25,18 @@ static float texel_share(const es_light_view* view, const es_light_face* face, u
     float length = es_v3_length(d);
     float solid_angle = es_sqrt(es_v3_dot(dx, dx) * es_v3_dot(dy, dy)) / (length * length * length);
     return solid_angle * es_light_falloff(&view->light, es_v3_scale(d, 1.0f / length), depth * length);
+}
+
+/* Surface that a texel covers, m²: solid angle times distance² (perspective), cross-section (orthographic), over the cosine. */
+static float texel_area(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float depth, es_vec3 normal)
+{
+    const es_pixel_rays* rays = &face->gbuffer_rays;
+    es_vec3 d = es_pixel_rays_direction(rays, (float)x, (float)y);
+    float length = es_v3_length(d), cosine = es_maxf(es_absf(es_v3_dot(d, normal)) / length, 0.05f);
+    const float* sx = view->orthographic ? rays->base_dx : rays->dir_dx;
+    const float* sy = view->orthographic ? rays->base_dy : rays->dir_dy;
+    float step = es_v3_length(es_v3(sx[0], sx[1], sx[2])) * es_v3_length(es_v3(sy[0], sy[1], sy[2]));
+    return view->orthographic ? step / cosine : step * depth * depth / (length * cosine);
 }
 
 typedef struct importance_job { const es_light_view* view; es_importance* importance; } importance_job;
@@ -54,7 +67,105 @@ static void importance_rows(void* user, uint32_t begin, uint32_t end, uint32_t w
     }
 }
 
-es_result es_importance_build(es_context* context, es_importance* importance, const es_light_view* view)
+/* ---- the picture's share ------------------------------------------------------------------------------------------------ */
+
+/* The picture's factor is found per block of texels. A share of its mean is added everywhere: what the estimate overlooks (it knows
+ * neither visibility nor what lies between the grid's pixels) still gets lights. */
+enum { BLOCK = 2, BLOCKS_MAX = 1024 };
+#define VIEW_FLOOR 0.03
+
+typedef struct view_job {
+    const es_light_view* view;
+    es_importance* importance;
+    const es_receivers* receivers;
+    const es_gi_kernels* kernels;
+    float* factor;      /* per block: rows of size / BLOCK, faces one after another */
+    double (*sums)[2];  /* per row of blocks: of importance, of importance times factor */
+    float floor;
+} view_job;
+
+static void view_factor_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    view_job* job = user;
+    uint32_t size = job->importance->size, blocks = size / BLOCK;
+    es_sender senders[BLOCKS_MAX];
+    uint32_t column[BLOCKS_MAX];
+    float found[BLOCKS_MAX];
+    for (uint32_t row = begin; row < end; row++) {
+        uint32_t f = row / blocks, y = row % blocks * BLOCK, count = 0;
+        const es_light_face* face = &job->view->faces[f];
+        const float* importance = job->importance->sums + f * job->importance->face_floats + (size_t)y * size;
+        float* factor = job->factor + (size_t)row * blocks;
+        for (uint32_t b = 0; b < blocks; b++) {
+            factor[b] = 0.0f;
+            /* the block stands at its brightest texel: it has one, and on the surface that matters */
+            uint32_t best_x = 0, best_y = 0;
+            float best = 0.0f;
+            for (uint32_t k = 0; k < BLOCK * BLOCK; k++) {
+                float value = importance[(size_t)(k / BLOCK) * size + b * BLOCK + k % BLOCK];
+                if (value > best) {
+                    best = value;
+                    best_x = b * BLOCK + k % BLOCK;
+                    best_y = y + k / BLOCK;
+                }
+            }
+            if (!(best > 0.0f)) continue;
+            size_t at = (size_t)best_y * face->gbuffer.stride + best_x;
+            es_vec3 p = es_pixel_rays_position(&face->gbuffer_rays, (float)best_x, (float)best_y, face->gbuffer.depth[at]), n = es_unpack_normal(face->gbuffer.normal[at]);
+            column[count] = b;
+            senders[count++] = (es_sender){{p.x, p.y, p.z}, {n.x, n.y, n.z}};
+        }
+        job->kernels->view_importance(job->receivers, senders, count, found);
+        for (uint32_t k = 0; k < count; k++) factor[column[k]] = found[k];
+        double sum = 0.0, weighted = 0.0;
+        for (uint32_t b = 0; b < blocks; b++) {
+            double block = 0.0;
+            for (uint32_t k = 0; k < BLOCK * BLOCK; k++) block += importance[(size_t)(k / BLOCK) * size + b * BLOCK + k % BLOCK];
+            sum += block;
+            weighted += block * factor[b];
+        }
+        job->sums[row][0] = sum;
+        job->sums[row][1] = weighted;
+    }
+}
+
+static void view_weight_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    view_job* job = user;
+    uint32_t size = job->importance->size, blocks = size / BLOCK;
+    for (uint32_t row = begin; row < end; row++) {
+        uint32_t f = row / size, y = row % size;
+        float* importance = job->importance->sums + f * job->importance->face_floats + (size_t)y * size;
+        const float* factor = job->factor + ((size_t)f * blocks + y / BLOCK) * blocks;
+        for (uint32_t x = 0; x < size; x++) importance[x] *= job->floor + factor[x / BLOCK];
+    }
+}
+
+static es_result weigh_by_view(es_context* context, es_importance* importance, const es_light_view* view, const es_receivers* receivers)
+{
+    uint32_t blocks = importance->size / BLOCK, rows = blocks * importance->face_count;
+    view_job job = {.view = view, .importance = importance, .receivers = receivers, .kernels = es_gi_kernel_table(es_context_isa(context))};
+    es_arena scratch;
+    es_arena_init(&scratch, context, 1 << 16);
+    job.factor = es_arena_allocate(&scratch, (size_t)rows * blocks * sizeof *job.factor);
+    job.sums = es_arena_allocate(&scratch, rows * sizeof *job.sums);
+    es_result result = job.factor && job.sums ? ES_OK : es_context_last_result(context);
+    if (!result) {
+        es_parallel_for(context, rows, 4, view_factor_rows, &job);
+        double sum = 0.0, weighted = 0.0;
+        for (uint32_t row = 0; row < rows; row++) {
+            sum += job.sums[row][0];
+            weighted += job.sums[row][1];
+        }
+        /* nothing the light reaches can light what is seen: then eq. 4.3 alone decides */
+        job.floor = weighted > 0.0 && sum > 0.0 ? (float)(VIEW_FLOOR * weighted / sum) : 1.0f;
+        es_parallel_for(context, importance->size * importance->face_count, 16, view_weight_rows, &job);
+    }
+    es_arena_free(&scratch);
+    return result;
+}
+
+es_result es_importance_build(es_context* context, es_importance* importance, const es_light_view* view, const es_receivers* receivers)
 {
     uint32_t size = view->faces[0].gbuffer.width;
     if (importance->size != size || importance->face_count != view->face_count) {
@@ -74,6 +185,10 @@ es_result es_importance_build(es_context* context, es_importance* importance, co
     }
     importance_job job = {view, importance};
     es_parallel_for(context, size * view->face_count, 8, importance_rows, &job);
+    if (receivers && receivers->count) {
+        es_result result = weigh_by_view(context, importance, view, receivers);
+        if (result) return result;
+    }
     for (uint32_t f = 0; f < view->face_count; f++) {
         float* sums = importance->sums + f * importance->face_floats;
         for (uint32_t l = 1; l < importance->level_count; l++) {
@@ -166,6 +281,7 @@ static void make_record(const es_light_view* view, const es_light_face* face, ui
         .power = {power.x, power.y, power.z},
         .incident = {incident.x, incident.y, incident.z},
         .specular_color = {surface.specular.x, surface.specular.y, surface.specular.z},
+        .area = texel_area(view, face, x, y, depth, normal) * weight,
         .roughness = surface.roughness,
         .model = surface.model,
         .glossy = glossy && es_surface_has_lobe(&surface),

@@ -3,6 +3,7 @@
 #define EARTHSHINE_GI_VPL_SAMPLING_H
 
 #include "gi/light_view.h"
+#include "gi/view_importance.h"
 #include "gi/vpl.h"
 
 /* Sums of importance over a square of texels, one pyramid per face: level 0 is the finest, each coarser cell the sum of four. */
@@ -13,7 +14,8 @@ typedef struct es_importance {
     float* sums;          /* face_count × face_floats */
 } es_importance;
 
-es_result es_importance_build(es_context* context, es_importance* importance, const es_light_view* view);
+/* Eq. 4.3 of every texel of the light's G-buffer; with receivers, times what the camera's picture makes of it. */
+es_result es_importance_build(es_context* context, es_importance* importance, const es_light_view* view, const es_receivers* receivers);
 void es_importance_free(es_context* context, es_importance* importance);
 
 /* Hierarchical warping (Clarberg et al. 2005, as Knecht §3.3 uses it) of a point of the unit square: the texel it falls on and

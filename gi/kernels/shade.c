@@ -79,10 +79,10 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
     const vf tx = vf_set1(light->tangent[0]), ty = vf_set1(light->tangent[1]), tz = vf_set1(light->tangent[2]);
     const vf bx = vf_set1(light->bitangent[0]), by = vf_set1(light->bitangent[1]), bz = vf_set1(light->bitangent[2]);
     const vf red = vf_set1(light->color[0]), green = vf_set1(light->color[1]), blue = vf_set1(light->color[2]);
-    const vf bound = vf_set1(job->geometry_bound);
+    const vf bound = vf_set1(job->geometry_bound), spread = vf_set1(light->spread);
     const vf half = vf_set1(0.5f * (float)job->map_size), last = vf_set1((float)job->map_size - 0.5f);
     const vf depth_scale = vf_set1((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance);
-    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
+    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance)), slope_bias = vf_set1(job->slope_bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
     const vi size = vi_set1((int32_t)job->map_size);
 
     for (uint32_t i = 0; i < lanes; i += VW) {
@@ -99,10 +99,11 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
             vf s = vf_and(lit, half / (r + qz));
             vi x = vi_truncate(vf_max(vf_min(qx * s + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * s + half, last), zero));
             vf depth = vf_from_int(vi_gather16(map, y * size + x));
-            lit &= vm_le(r * depth_scale, depth + bias);
+            /* r - bias - slope_bias / cos <= depth, times r cos */
+            lit &= vm_le((r * depth_scale - bias) * vf_neg(pixel_cos) - slope_bias * r, depth * vf_neg(pixel_cos));
         }
         /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
-        vf g = vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * r2), bound));
+        vf g = vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + spread)), bound));
         if (!glossy_light && !lobes) {
             vf_store(batch->e[0] + i, vf_load(batch->e[0] + i) + g * red);
             vf_store(batch->e[1] + i, vf_load(batch->e[1] + i) + g * green);
@@ -146,13 +147,13 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
     const vf tx = vf_set1(light->tangent[0]), ty = vf_set1(light->tangent[1]), tz = vf_set1(light->tangent[2]);
     const vf bx = vf_set1(light->bitangent[0]), by = vf_set1(light->bitangent[1]), bz = vf_set1(light->bitangent[2]);
     const vf red = vf_set1(light->color[0]), green = vf_set1(light->color[1]), blue = vf_set1(light->color[2]);
-    const vf bound = vf_set1(job->geometry_bound);
+    const vf bound = vf_set1(job->geometry_bound), spread = vf_set1(light->spread);
     const vf half = vf_set1(0.5f * (float)job->map_size), last = vf_set1((float)job->map_size - 0.5f);
     const vf depth_scale = vf_set1((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance);
-    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
+    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance)), slope_bias = vf_set1(job->slope_bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
     const vi size = vi_set1((int32_t)job->map_size);
     uint32_t listed[STRETCH / VW + 1];
-    float geometry[STRETCH], nearest[STRETCH];
+    float geometry[STRETCH], nearest[STRETCH], cosine[STRETCH];
     int32_t place[STRETCH];
     /* the next light's map comes into the second-level cache meanwhile, a line for each vector of the batch */
     const uint32_t lines = (uint32_t)(((size_t)job->map_size * job->map_size * sizeof *map + 63) / 64);
@@ -176,7 +177,7 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
             vm lit = vm_gt(qz, zero) & vm_lt(pixel_cos, zero);
             vf r2 = dx * dx + dy * dy + dz * dz;
             /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
-            vf_store(geometry + k * VW, vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * r2), bound)));
+            vf_store(geometry + k * VW, vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + spread)), bound)));
             if (!shadowed) continue;
             vf r = vf_sqrt(r2);
             vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz;
@@ -184,14 +185,17 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
             vf s = vf_and(lit, half / (r + qz));
             vi x = vi_truncate(vf_max(vf_min(qx * s + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * s + half, last), zero));
             vi_store(place + k * VW, y * size + x);
-            vf_store(nearest + k * VW, r * depth_scale - bias);
+            /* r - bias - slope_bias / cos <= depth, times r cos, which is what pixel_cos holds with its sign turned */
+            vf facing = vf_neg(pixel_cos);
+            vf_store(cosine + k * VW, facing);
+            vf_store(nearest + k * VW, (r * depth_scale - bias) * facing - slope_bias * r);
         }
         for (uint32_t k = 0; k < count; k++) {
             const uint32_t i = listed[k];
             vf g = vf_load(geometry + k * VW);
             if (shadowed) {
                 vf depth = vf_from_int(vi_gather16_at(map, place + k * VW));
-                g = vf_and(vm_le(vf_load(nearest + k * VW), depth), g);
+                g = vf_and(vm_le(vf_load(nearest + k * VW), depth * vf_load(cosine + k * VW)), g);
             }
             vf_store(batch->e[0] + i, vf_load(batch->e[0] + i) + g * red);
             vf_store(batch->e[1] + i, vf_load(batch->e[1] + i) + g * green);
