@@ -16,7 +16,6 @@
     X(void, draw_large, (es_tile * tile, const es_segment* segment))                                                                 \
     X(void, draw_small, (es_tile * tile, const es_segment* segment))                                                                 \
     X(void, draw_masked, (es_tile * tile, const es_segment* segment))                                                                \
-    X(void, block_minima, (es_tile * tile))                                                                                          \
     X(void, resolve_tile, (es_resolve_job * job, const es_tile* tile))                                                              \
     /* points.h: work holds es_splat_texels(size) texels */                                                                         \
     X(void, splat_parabolic_map, (const es_parabolic_map* map, const es_point_set* points, uint16_t* work))                         \

@@ -283,7 +283,6 @@ static tile_out run_tile(const es_raster_kernels* k, const tile_input* in, int k
     if (kind == 0) k->draw_small(&tile, &segment);
     if (kind == 1) k->draw_large(&tile, &segment);
     if (kind == 2) k->draw_masked(&tile, &segment);
-    k->block_minima(&tile);
     assert_int_equal(tile.next_number, 1 + count);
     o.hidden = tile.hidden;
     return o;
@@ -301,7 +300,7 @@ static void check_coverage(const tile_input* in, int kind, uint32_t count, const
 {
     for (int y = 0; y < 64; y++)
         for (int x = 0; x < 64; x++) {
-            bool covered = false;
+            bool covered = false, unsure = false;
             for (uint32_t i = 0; i < count && !covered; i++) {
                 int64_t vx[3], vy[3], cx, cy;
                 float low;
@@ -316,7 +315,10 @@ static void check_coverage(const tile_input* in, int kind, uint32_t count, const
                     cx = ((int64_t)in->tile.x + x) * 256 + 128 - (int64_t)in->tile.width * 128, cy = ((int64_t)in->tile.y + y) * 256 + 128 - (int64_t)in->tile.height * 128;
                     low = fminf(fminf(t->z0, t->z1), t->z2);
                 }
-                if (!(low > 0)) continue; /* partly beyond the far plane: depth decides too */
+                if (!(low > 0)) { /* partly beyond the far plane: depth decides too */
+                    unsure = true;
+                    continue;
+                }
                 covered = true;
                 for (int k = 0; k < 3; k++) {
                     int j = (k + 1) % 3;
@@ -324,7 +326,7 @@ static void check_coverage(const tile_input* in, int kind, uint32_t count, const
                     covered &= e > 0 || (e == 0 && (dy < 0 || (dy == 0 && dx > 0)));
                 }
             }
-            if (covered) assert_true(depth[y * ES_TILE_PITCH + x] > 0);
+            if (covered || !unsure) assert_true((depth[y * ES_TILE_PITCH + x] > 0) == covered);
         }
 }
 
@@ -356,7 +358,7 @@ static void test_tiles(void** state)
             for (int ids = 0; ids < 2; ids++) {
                 uint32_t count = kind == 2 ? 40 : trial % 3 ? 3 + random_bits() % 20 : RECORDS;
                 tile_out expected = run_tile(scalar(), in, kind, ids, count);
-                if (kind < 2 && trial < 12) check_coverage(in, kind, count < 24 ? count : 24, data(expected.depth));
+                if (kind < 2 && count < 24) check_coverage(in, kind, count, data(expected.depth));
                 FOR_EACH_ISA(k)
                 {
                     tile_out o = run_tile(k, in, kind, ids, count);

@@ -230,6 +230,36 @@ static void test_fans(void** state)
     close_bench(b);
 }
 
+/* A grid of small triangles whose corners are pixel centres and pixel corners: pixel centres lie on edges and vertices everywhere. */
+static void test_small_grid(void** state)
+{
+    bench* b = open_bench(1, 0);
+    for (int trial = 0; trial < 6; trial++) {
+        static const double steps[] = {0.5, 1, 1.5, 2, 6, 10};
+        enum { N = 12 };
+        mesh m = new_mesh((N + 1) * (N + 1), 2 * N * N);
+        double step = steps[trial] * 0.0625; /* view of 90 degrees and 32 pixels: x = 1 is 16 pixels, exact in binary */
+        for (int j = 0; j <= N; j++)
+            for (int i = 0; i <= N; i++) add_vertex(&m, (i - N / 2) * step + 0.03125, (j - N / 2) * step + 0.03125, -1);
+        for (uint32_t j = 0; j < N; j++)
+            for (uint32_t i = 0; i < N; i++) {
+                uint32_t a = j * (N + 1) + i, c = a + N + 1;
+                bool other = random_bits() & 1;
+                add_triangle(&m, a, a + 1, other ? c : c + 1);
+                add_triangle(&m, other ? a + 1 : a, c + 1, c);
+            }
+        es_raster_view view = es_perspective_view(32, 32, origin, ahead, up, 1.5f, 0.05f);
+        view.projection.m[0] = view.projection.m[5] = 1;
+        /* pixels whose centre is inside, on the left or on the top border, counted by hand: N * step a side, or all */
+        uint32_t side = (uint32_t)(N * steps[trial]);
+        uint32_t inside = side < 32 ? side * side : 32 * 32;
+        assert_int_equal(miscovered(b, &m, view, 1), 32 * 32 - inside);
+        assert_int_equal(miscovered(b, &m, view, 0), inside); /* and nothing outside is drawn, or drawn twice */
+        free_mesh(&m);
+    }
+    close_bench(b);
+}
+
 static void add_box(mesh* m, const double low[3], const double high[3])
 {
     uint32_t v[8];
@@ -1224,6 +1254,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_shared_edges),
         cmocka_unit_test(test_fans),
+        cmocka_unit_test(test_small_grid),
         cmocka_unit_test(test_inside_a_box),
         cmocka_unit_test(test_closed_soup),
         cmocka_unit_test(test_coverage_notices_a_tear),

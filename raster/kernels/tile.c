@@ -342,16 +342,3 @@ void ES_KERNEL(es_draw_masked)(es_tile* tile, const es_segment* segment)
         tile->hidden += !any;
     }
 }
-
-void ES_KERNEL(es_block_minima)(es_tile* tile)
-{
-    for (int by = 0; by < 8; by++)
-        for (int bx = 0; bx < 8; bx++) {
-            const float* d = tile->depth + 8 * by * ES_TILE_PITCH + 8 * bx;
-            vf least = vf_load(d);
-            for (int row = 1; row < 8; row++) least = vf_min(least, vf_load(d + row * ES_TILE_PITCH));
-            float m = least[0];
-            for (int i = 1; i < VW; i++) m = least[i] < m ? least[i] : m;
-            tile->block_minimum[8 * by + bx] = m;
-        }
-}
