@@ -39,6 +39,7 @@ typedef struct es_renderer_settings {
     float geometry_bound;            /* 1/m²: cos cos / d² of a pair is cut off here (Knecht eq. 4.7 with 1/bound = d²min) */
     float spread;                    /* how far a light's own area softens it close by: 0 a point, 1 a disc of that area */
     bool view_importance;            /* more lights where they matter for what the camera sees */
+    float lobe_roughness;            /* lobes sharper than this GGX roughness are widened to it under virtual point lights */
     bool glossy_vpls;                /* VPLs emit their surface's glossy lobe too (Knecht §3.4.3) */
     /* imperfect shadow maps */
     uint32_t ism_size;               /* texels of a side: 32, 64, 128, 256 */

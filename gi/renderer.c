@@ -405,14 +405,14 @@ static es_result pass_shading(es_renderer* r, const frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VPLS);
     es_plan_reads_pass(plan, ES_PASS_ISM);
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, (float)s->interleave, in->extent, r->has_specular};
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)s->interleave, in->extent, r->has_specular};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = es_planes_resize(r->context, &r->irradiance, &r->gbuffer);
     if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, &r->gbuffer);
     if (result) return result;
     es_shade_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
-        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .geometry_bound = s->geometry_bound, .interleave = s->interleave};
+        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = s->geometry_bound, .interleave = s->interleave};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = r->irradiance.at[k];
         job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;

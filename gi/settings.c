@@ -22,6 +22,7 @@ static const es_setting renderer_table[] = {
     {"vpl.bound", ES_SETTING_FLOAT, "1000", 0.001, 1000000, NULL, "largest geometry term cos cos / d², 1/m²", AT(geometry_bound)},
     {"vpl.spread", ES_SETTING_FLOAT, "2", 0, 100, NULL, "how far a light's own area softens it close by: 0 a point, 1 a disc", AT(spread)},
     {"vpl.view-importance", ES_SETTING_BOOL, "true", 0, 1, NULL, "more lights where they matter for what the camera sees", AT(view_importance)},
+    {"vpl.roughness", ES_SETTING_FLOAT, "0.5", 0, 1, NULL, "lobes sharper than this are widened to it, or each light would show as a spot", AT(lobe_roughness)},
     {"vpl.glossy", ES_SETTING_BOOL, "true", 0, 1, NULL, "virtual point lights emit their surface's glossy lobe too", AT(glossy_vpls)},
 
     {"ism.size", ES_SETTING_INT, "128", 32, 256, NULL, "texels of an imperfect shadow map's side: 32, 64, 128 or 256", AT(ism_size)},

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "gi/kernel_table.h"
+#include "platform/maths.h"
 
 typedef struct shade_loop {
     const es_shade_job* job;
@@ -32,9 +33,17 @@ static void shade_blocks(void* user, uint32_t begin, uint32_t end, uint32_t work
     }
 }
 
-static es_shade_light light_of(const es_vpl_record* vpl, float scale, float spread)
+/* Phong's exponent with the width of a GGX lobe: alpha² = 2 / (e + 2) (Walter et al. 2007) */
+static float widest_exponent(float roughness)
 {
-    es_shade_light light = {.spread = vpl->area * (0.318309886f * spread), .roughness = vpl->roughness, .model = vpl->model, .glossy = vpl->glossy};
+    float alpha = roughness * roughness;
+    return 2.0f / es_maxf(alpha * alpha, 1e-6f) - 2.0f;
+}
+
+static es_shade_light light_of(const es_vpl_record* vpl, float scale, float spread, float lobe_roughness)
+{
+    es_shade_light light = {.spread = vpl->area * (0.318309886f * spread), .model = vpl->model, .glossy = vpl->glossy};
+    light.roughness = vpl->model == ES_SURFACE_PHONG ? es_minf(vpl->roughness, es_maxf(widest_exponent(lobe_roughness), 1.0f)) : es_maxf(vpl->roughness, lobe_roughness);
     memcpy(light.position, vpl->position, sizeof light.position);
     memcpy(light.normal, vpl->normal, sizeof light.normal);
     memcpy(light.tangent, vpl->tangent, sizeof light.tangent);
@@ -54,7 +63,7 @@ es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job
     es_shade_light* lights = es_arena_allocate(arena, ((size_t)job->vpl_count + 1) * sizeof *lights);
     es_shade_batch* batches = es_arena_allocate(arena, (size_t)es_context_workers(context) * sizeof *batches);
     if (!lights || !batches) return es_context_last_result(context);
-    for (uint32_t v = 0; v < job->vpl_count; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread);
+    for (uint32_t v = 0; v < job->vpl_count; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread, job->lobe_roughness);
 
     shade_loop loop = {.job = job, .lights = lights, .batches = batches, .kernels = es_gi_kernel_table(es_context_isa(context))};
     uint32_t columns = (width + n - 1) / n, rows = (height + n - 1) / n;

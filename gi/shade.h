@@ -37,6 +37,7 @@ typedef struct es_shade_job {
     float bias, slope_bias;        /* metres */
     float spread;
     float geometry_bound;          /* 1/m² */
+    float lobe_roughness;          /* lobes of lights and pixels are at least as wide as GGX of this roughness */
     uint32_t interleave;           /* n, 1 … ES_INTERLEAVE_MAX */
     /* out, rows of gbuffer->stride; 0 where nothing is seen */
     float* irradiance[3];

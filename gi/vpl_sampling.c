@@ -72,7 +72,7 @@ static void importance_rows(void* user, uint32_t begin, uint32_t end, uint32_t w
 /* The picture's factor is found per block of texels. A share of its mean is added everywhere: what the estimate overlooks (it knows
  * neither visibility nor what lies between the grid's pixels) still gets lights. */
 enum { BLOCK = 2, BLOCKS_MAX = 1024 };
-#define VIEW_FLOOR 0.03
+#define VIEW_FLOOR 0.1
 
 typedef struct view_job {
     const es_light_view* view;

@@ -20,6 +20,8 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
     const es_pixel_rays* rays = &job->rays;
     const uint32_t n = job->interleave;
     const vf zero = vf_zero();
+    const float alpha = job->lobe_roughness * job->lobe_roughness, alpha2 = alpha * alpha;
+    const float most_exponent = alpha2 > 0.6f ? 1.0f : 2.0f / (alpha2 > 1e-6f ? alpha2 : 1e-6f) - 2.0f; /* as in shade.c */
     vm lobes = vi_zero();
     for (uint32_t j = 0; j < p->rows; j++) {
         uint32_t y = p->y0 + j * n;
@@ -63,7 +65,8 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 vf_store(batch->f0[k] + at, surface.specular[k]);
                 vf_store(batch->s[k] + at, zero);
             }
-            vf_store(batch->roughness + at, surface.roughness);
+            vm phong = vi_eq(surface.model, vi_set1(ES_SURFACE_PHONG));
+            vf_store(batch->roughness + at, vf_select(phong, vf_min(surface.roughness, vf_set1(most_exponent)), vf_max(surface.roughness, vf_set1(job->lobe_roughness))));
             vi_store(batch->model + at, surface.model);
         }
     }
