@@ -54,7 +54,7 @@ typedef struct es_renderer_settings {
     uint32_t classic_size;           /* texels of a classic map's side */
     /* interleaved shading and filter */
     uint32_t interleave;             /* n of the n × n pattern, 1 … 16 */
-    bool filter;
+    uint32_t filter_passes;          /* 0: none; 1: a box, in which single bright pixels leave n × n blocks; 2: a tent, which is smooth */
     float filter_depth;              /* largest relative depth difference (Knecht: 0.01) */
     float filter_normal;             /* smallest dot product of normals (Knecht: 0.8) */
     /* display */

@@ -75,9 +75,11 @@ static void free_frame_buffers(es_renderer* renderer)
     es_gbuffer_destroy(context, &renderer->gbuffer);
     es_planes_free(context, &renderer->direct);
     es_planes_free(context, &renderer->irradiance);
-    es_planes_free(context, &renderer->filtered_irradiance);
     es_planes_free(context, &renderer->specular);
-    es_planes_free(context, &renderer->filtered_specular);
+    for (int i = 0; i < 2; i++) {
+        es_planes_free(context, &renderer->filtered_irradiance[i]);
+        es_planes_free(context, &renderer->filtered_specular[i]);
+    }
 }
 
 void es_renderer_destroy(es_renderer* renderer)
@@ -427,8 +429,8 @@ static es_result pass_filter(es_renderer* r, const frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter ? "filter is off" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
-    r->filtered = why == NULL;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    r->filter_passes = why ? 0 : s->filter_passes;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_FILTER, why);
         return ES_OK;
@@ -436,22 +438,29 @@ static es_result pass_filter(es_renderer* r, const frame_inputs* in)
     es_plan_begin(plan, ES_PASS_FILTER);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
-    float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular};
+    float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
-    es_result result = es_planes_resize(r->context, &r->filtered_irradiance, &r->gbuffer);
-    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->filtered_specular, &r->gbuffer);
-    if (result) return result;
-    es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
-    for (int k = 0; k < 3; k++) {
-        job.source[k] = r->irradiance.at[k];
-        job.result[k] = r->filtered_irradiance.at[k];
-        job.source[k + 3] = r->specular.at[k];
-        job.result[k + 3] = r->filtered_specular.at[k];
+    es_result result = ES_OK;
+    for (uint32_t i = 0; i < 2 && i < s->filter_passes && !result; i++) {
+        result = es_planes_resize(r->context, &r->filtered_irradiance[i], &r->gbuffer);
+        if (!result && r->has_specular) result = es_planes_resize(r->context, &r->filtered_specular[i], &r->gbuffer);
     }
-    es_arena_reset(&r->arena);
-    result = es_filter_geometry_aware(r->context, &r->arena, &job);
-    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+    const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
+    for (uint32_t pass = 0; pass < s->filter_passes && !result; pass++) {
+        es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+        for (int k = 0; k < 3; k++) {
+            job.source[k] = irradiance->at[k];
+            job.result[k] = r->filtered_irradiance[pass % 2].at[k];
+            job.source[k + 3] = specular->at[k];
+            job.result[k + 3] = r->filtered_specular[pass % 2].at[k];
+        }
+        irradiance = &r->filtered_irradiance[pass % 2];
+        specular = &r->filtered_specular[pass % 2];
+        es_arena_reset(&r->arena);
+        result = es_filter_geometry_aware(r->context, &r->arena, &job);
+    }
+    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)r->gbuffer.width * r->gbuffer.height * s->filter_passes);
     return result;
 }
 
@@ -459,8 +468,8 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
 {
     const es_renderer_settings* s = &r->settings;
     es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure), .white = s->white, .tone_map = s->tone_map};
-    const es_planes* irradiance = r->filtered ? &r->filtered_irradiance : &r->irradiance;
-    const es_planes* specular = r->filtered ? &r->filtered_specular : &r->specular;
+    const es_planes* irradiance = r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : &r->irradiance;
+    const es_planes* specular = r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : &r->specular;
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];

@@ -38,9 +38,10 @@ struct es_renderer {
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */
 
     es_planes direct;          /* reflected direct radiance */
-    es_planes irradiance, filtered_irradiance;
-    es_planes specular, filtered_specular; /* used when something in the frame has a lobe */
-    bool has_specular, filtered;
+    es_planes irradiance, filtered_irradiance[2]; /* two to go back and forth between */
+    es_planes specular, filtered_specular[2];     /* used when something in the frame has a lobe */
+    bool has_specular;
+    uint32_t filter_passes;    /* that this frame's indirect light went through */
     es_arena arena;            /* of the pass that runs */
     uint32_t* display;         /* 0x00RRGGBB */
 };

@@ -37,7 +37,7 @@ static const es_setting renderer_table[] = {
     {"classic.size", ES_SETTING_INT, "256", 32, 1024, NULL, "texels of a classic map's side, a power of two", AT(classic_size)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
-    {"filter", ES_SETTING_BOOL, "true", 0, 1, NULL, "geometry-aware filter over the pattern", AT(filter)},
+    {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent", AT(filter_passes)},
     {"filter.depth", ES_SETTING_FLOAT, "0.03", 0, 1, NULL, "largest relative depth difference the filter crosses", AT(filter_depth)},
     {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
 
