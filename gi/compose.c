@@ -2,6 +2,17 @@
 
 #include "gi/kernel_table.h"
 #include "platform/context.h"
+#include "platform/image_files.h"
+
+void es_srgb_table_fill(es_srgb_table* table)
+{
+    double thresholds[255];
+    es_srgb_thresholds(thresholds);
+    for (uint32_t i = 0; i < ES_SRGB_TABLE_SIZE; i++) {
+        double root = (double)i / (ES_SRGB_TABLE_SIZE - 1);
+        table->code[i] = es_srgb_encode8(thresholds, (float)(root * root));
+    }
+}
 
 typedef struct compose_loop { const es_gi_kernels* kernels; const es_compose_job* job; } compose_loop;
 

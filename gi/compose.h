@@ -4,6 +4,12 @@
 
 #include "gi/gi.h"
 
+/* sRGB codes of linear values by the rounded square root of the value times its last index: a step is below a tenth of a code
+ * everywhere, dark end included. */
+enum { ES_SRGB_TABLE_SIZE = 4096 };
+typedef struct es_srgb_table { uint32_t code[ES_SRGB_TABLE_SIZE]; } es_srgb_table;
+void es_srgb_table_fill(es_srgb_table* table);
+
 typedef struct es_compose_job {
     const es_gbuffer* gbuffer;
     const float* direct[3];       /* NULL: none */
@@ -13,6 +19,7 @@ typedef struct es_compose_job {
     float white;                  /* Reinhard: the radiance that becomes 1 */
     uint32_t tone_map;            /* es_tone_map */
     uint32_t* xrgb;               /* sRGB-encoded, width words a row; NULL: not wanted */
+    const es_srgb_table* srgb;    /* for xrgb */
     float* radiance[3];           /* before exposure, rows of gbuffer->stride; NULL: not wanted */
     float* indirect[3];           /* the indirect part of it; NULL: not wanted */
     float* display[3];            /* after the tone map, linear [0, 1]; NULL: not wanted */

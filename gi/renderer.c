@@ -58,6 +58,7 @@ es_result es_renderer_create(es_context* context, const es_renderer_settings* se
     renderer->settings = resolved;
     es_context_count_object(context, 1);
     es_arena_init(&renderer->arena, context, 1 << 16);
+    es_srgb_table_fill(&renderer->srgb);
     result = es_rasterizer_create(context, &renderer->rasterizer);
     if (result) {
         es_renderer_destroy(renderer);
@@ -491,6 +492,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_COMPOSE)) return;
     job.xrgb = r->display;
+    job.srgb = &r->srgb;
     es_compose(r->context, &job);
     es_plan_done(plan, ES_PASS_COMPOSE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
 }

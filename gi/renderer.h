@@ -44,6 +44,7 @@ struct es_renderer {
     uint32_t filter_passes;    /* that this frame's indirect light went through */
     es_arena arena;            /* of the pass that runs */
     uint32_t* display;         /* 0x00RRGGBB */
+    es_srgb_table srgb;
 };
 
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer);
