@@ -60,19 +60,16 @@ static inline bool es_surface_has_lobe(const es_surface* s)
     return s->model == ES_SURFACE_PHONG ? f0 > 0.0f : f0 > 0.4f * alpha * alpha;
 }
 
-/* What the eye sees of a triangle may lie beyond the horizon of the interpolated normal; such directions count as grazing. */
-#define ES_SURFACE_MIN_COSINE 1e-3f
-
 /* Reflected by the diffuse part: *pass; by the lobe: *lobe (per steradian, without the cosine). n, wi, wo are unit; both are 0 unless wi
- * is above the surface. */
+ * and wo are above the surface. */
 static inline void es_surface_parts(const es_surface* s, es_vec3 n, es_vec3 wi, es_vec3 wo, float* pass, es_vec3* lobe)
 {
     float nl = es_v3_dot(n, wi), nv = es_v3_dot(n, wo), c = es_v3_dot(wi, wo);
     *pass = 0.0f;
     *lobe = es_v3(0, 0, 0);
-    if (!(nl > 0.0f)) return;
-    nl = es_clampf(nl, ES_SURFACE_MIN_COSINE, 1.0f);
-    nv = es_clampf(nv, ES_SURFACE_MIN_COSINE, 1.0f);
+    if (!(nl > 0.0f && nv > 0.0f)) return;
+    nl = es_minf(nl, 1.0f);
+    nv = es_minf(nv, 1.0f);
     if (s->model == ES_SURFACE_PHONG) {
         float r = es_minf(es_maxf(2.0f * nl * nv - c, 0.0f), 1.0f);
         *pass = 1.0f;

@@ -155,6 +155,7 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                             vy = dy * inverse;
                             vz = dz * inverse;
                         }
+                        es_lift_to_horizon_v(nx, ny, nz, &vx, &vy, &vz);
                         vf fr, fg, fb;
                         es_surface_reflect_gbuffer_v(vi_load(g->albedo_rg + at), vi_load(g->albedo_b + at), surface_word, nx, ny, nz, lx, ly, lz, vx, vy, vz, &fr, &fg, &fb);
                         /* irradiance of the light times the model; cos is in the irradiance */

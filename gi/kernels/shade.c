@@ -56,9 +56,11 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             vf v[3];
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
             vf s = vf_set1(1.0f) / vf_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-            vf_store(batch->vx + at, vf_and(seen, v[0] * s));
-            vf_store(batch->vy + at, vf_and(seen, v[1] * s));
-            vf_store(batch->vz + at, vf_and(seen, v[2] * s));
+            for (int k = 0; k < 3; k++) v[k] = v[k] * s;
+            es_lift_to_horizon_v(nx, ny, nz, &v[0], &v[1], &v[2]);
+            vf_store(batch->vx + at, vf_and(seen, v[0]));
+            vf_store(batch->vy + at, vf_and(seen, v[1]));
+            vf_store(batch->vz + at, vf_and(seen, v[2]));
             es_surface_v surface = es_surface_of_gbuffer_v(vi_gather(g->albedo_rg + row, x), vi_gather(g->albedo_b + row, x), vi_gather(g->surface + row, x));
             for (int k = 0; k < 3; k++) {
                 lobes |= seen & vm_gt(surface.specular[k], zero);

@@ -34,9 +34,9 @@ VINL void es_surface_parts_v(const es_surface_v* s, vf nx, vf ny, vf nz, vf ix, 
 {
     const vf zero = vf_zero(), one = vf_set1(1.0f);
     vf nl = nx * ix + ny * iy + nz * iz, nv = nx * ox + ny * oy + nz * oz, c = ix * ox + iy * oy + iz * oz;
-    vm above = vm_gt(nl, zero);
-    nl = vf_clamp(nl, vf_set1(ES_SURFACE_MIN_COSINE), one);
-    nv = vf_clamp(nv, vf_set1(ES_SURFACE_MIN_COSINE), one);
+    vm above = vm_gt(nl, zero) & vm_gt(nv, zero);
+    nl = vf_min(nl, one);
+    nv = vf_min(nv, one);
     vf f90 = vf_min(vf_set1(25.0f) * vf_max(s->specular[0], vf_max(s->specular[1], s->specular[2])), one);
     vf a = one - nl, b = one - nv;
     vf a2 = a * a, b2 = b * b;
@@ -59,6 +59,16 @@ VINL void es_surface_parts_v(const es_surface_v* s, vf nx, vf ny, vf nz, vf ix, 
     }
     *pass = vf_and(above, *pass);
     for (int k = 0; k < 3; k++) lobe[k] = vf_and(above, lobe[k]);
+}
+
+/* The eye may see a triangle from beyond the horizon of its interpolated normal, at every silhouette of a coarse mesh: the direction to
+ * it is lifted to a grazing one, or the surface would have a black rim. */
+VINL void es_lift_to_horizon_v(vf nx, vf ny, vf nz, vf* x, vf* y, vf* z)
+{
+    vf lift = vf_max(vf_set1(1e-3f) - (nx * *x + ny * *y + nz * *z), vf_zero());
+    *x = *x + lift * nx;
+    *y = *y + lift * ny;
+    *z = *z + lift * nz;
 }
 
 /* f(wi, wo), 1/sr, of G-buffer words */
