@@ -12,6 +12,8 @@
 
 #include <cmocka.h>
 
+#include <pthread.h>
+
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -22,12 +24,16 @@
 
 typedef struct log_record { int count; es_result last; char message[1100]; } log_record;
 
+static pthread_mutex_t record_lock = PTHREAD_MUTEX_INITIALIZER;
+
 static void record(void* user, es_log_level level, es_result item, const char* message)
 {
     log_record* r = user;
+    pthread_mutex_lock(&record_lock); /* workers log, too */
     r->count++;
     r->last = item;
     snprintf(r->message, sizeof r->message, "%s", message);
+    pthread_mutex_unlock(&record_lock);
 }
 
 typedef struct bench { es_context* context; es_rasterizer* rasterizer; log_record log; } bench;

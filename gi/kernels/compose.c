@@ -73,6 +73,7 @@ void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uin
                 indirect.g = indirect.g + vf_load(job->specular[1] + at);
                 indirect.b = indirect.b + vf_load(job->specular[2] + at);
             }
+            indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
             c.r = c.r + indirect.r;
             c.g = c.g + indirect.g;
             c.b = c.b + indirect.b;
