@@ -17,7 +17,7 @@ es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuf
     size_t floats = (size_t)gbuffer->stride * gbuffer->height, bytes = 3 * floats * sizeof(float);
     if (planes->bytes == bytes) return ES_OK;
     es_planes_free(context, planes);
-    planes->memory = es_allocate_zero(context, bytes);
+    planes->memory = es_allocate(context, bytes); /* each pass writes all of its planes */
     if (!planes->memory) return es_context_last_result(context);
     planes->bytes = bytes;
     for (int k = 0; k < 3; k++) planes->at[k] = (float*)planes->memory + (size_t)k * floats;
@@ -122,7 +122,7 @@ static es_result resize_frame(es_renderer* renderer)
     es_plan_invalidate(&renderer->plan);
     es_result result = es_gbuffer_create(context, s->width, s->height, ES_GBUFFER_ALL, &renderer->gbuffer);
     if (result) return result;
-    renderer->display = es_allocate_zero(context, (size_t)s->width * s->height * sizeof(uint32_t));
+    renderer->display = es_allocate(context, (size_t)s->width * s->height * sizeof(uint32_t));
     return renderer->display ? es_planes_resize(context, &renderer->direct, &renderer->gbuffer) : es_context_last_result(context);
 }
 

@@ -46,12 +46,13 @@ static void distribute_subsets(void* user, uint32_t begin, uint32_t end, uint32_
         uint32_t instance = 0;
         for (uint32_t k = 0; k < points->subset_size; k++) {
             size_t at = (size_t)s * points->subset_size + k;
-            uint32_t counter = 3 * (uint32_t)at;
+            uint32_t counter = 2 * (uint32_t)at;
             double place = ((double)k + es_random_float(1, counter)) * step;
             while (t + 1 < triangle_total && d->area_before[t + 1] <= place) t++;
             while (t >= d->first_triangle[instance + 1]) instance++;
             /* uniform on the triangle: fold the unit square along its diagonal */
-            float u = es_random_float(1, counter + 1), v = es_random_float(1, counter + 2);
+            uint32_t bits = es_random_u32(1, counter + 1);
+            float u = ((float)(bits & 0xffff) + 0.5f) * (1.0f / 65536.0f), v = ((float)(bits >> 16) + 0.5f) * (1.0f / 65536.0f);
             if (u + v > 1.0f) {
                 u = 1.0f - u;
                 v = 1.0f - v;
@@ -69,11 +70,12 @@ static es_result collect_runs(es_context* context, es_scene_points* points, cons
     size_t total = (size_t)points->subset_size * points->subset_count, run_count = 0;
     size_t* first = es_allocate_zero(context, ((size_t)instance_count + 1) * sizeof *first);
     if (!first) return es_context_last_result(context);
-    for (size_t i = 0; i < total; i++)
-        if (i % points->subset_size == 0 || instance_of_point[i] != instance_of_point[i - 1]) {
-            first[instance_of_point[i] + 1]++;
-            run_count++;
-        }
+    for (size_t begin = 0; begin < total; begin += points->subset_size)
+        for (size_t i = begin; i < begin + points->subset_size; i++)
+            if (i == begin || instance_of_point[i] != instance_of_point[i - 1]) {
+                first[instance_of_point[i] + 1]++;
+                run_count++;
+            }
     es_result result = ES_OK;
     if (run_count > points->run_capacity) {
         es_release(context, points->runs, points->run_capacity * sizeof *points->runs);
@@ -83,12 +85,13 @@ static es_result collect_runs(es_context* context, es_scene_points* points, cons
     }
     if (!result) {
         for (uint32_t i = 0; i < instance_count; i++) first[i + 1] += first[i];
-        for (size_t i = 0; i < total;) {
+        for (size_t i = 0, border = points->subset_size; i < total;) {
             uint32_t instance = instance_of_point[i];
             size_t end = i + 1;
-            while (end % points->subset_size != 0 && instance_of_point[end] == instance) end++;
+            while (end < border && instance_of_point[end] == instance) end++;
             points->runs[first[instance]++] = (es_point_run){(uint32_t)i, (uint32_t)(end - i), instance};
             i = end;
+            if (i == border) border += points->subset_size;
         }
         points->run_count = run_count;
     }

@@ -70,6 +70,7 @@ typedef struct es_shade_batch {
     float vx[ES_SHADE_LANES], vy[ES_SHADE_LANES], vz[ES_SHADE_LANES];  /* unit, to the eye */
     float f0[3][ES_SHADE_LANES], roughness[ES_SHADE_LANES];
     int32_t model[ES_SHADE_LANES];
+    uint8_t lobed[ES_SHADE_LANES / 8];  /* per vector: does a pixel of it have a lobe? */
     float s[3][ES_SHADE_LANES];
 } es_shade_batch;
 

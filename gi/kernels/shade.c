@@ -62,11 +62,14 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             vf_store(batch->vy + at, vf_and(seen, v[1]));
             vf_store(batch->vz + at, vf_and(seen, v[2]));
             es_surface_v surface = es_surface_of_gbuffer_v(vi_gather(g->albedo_rg + row, x), vi_gather(g->albedo_b + row, x), vi_gather(g->surface + row, x));
+            vm lobed = vi_zero();
             for (int k = 0; k < 3; k++) {
-                lobes |= seen & vm_gt(surface.specular[k], zero);
+                lobed |= seen & vm_gt(surface.specular[k], zero);
                 vf_store(batch->f0[k] + at, surface.specular[k]);
                 vf_store(batch->s[k] + at, zero);
             }
+            lobes |= lobed;
+            batch->lobed[at / VW] = vm_any(lobed);
             vm phong = vi_eq(surface.model, vi_set1(ES_SURFACE_PHONG));
             vf_store(batch->roughness + at, vf_select(phong, vf_min(surface.roughness, vf_set1(most_exponent)), vf_max(surface.roughness, vf_set1(job->lobe_roughness))));
             vi_store(batch->model + at, surface.model);
@@ -109,7 +112,9 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
         }
         /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
         vf g = vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + spread)), bound));
-        if (!glossy_light && !lobes) {
+        /* without F0 a lobe is 0 and lets everything pass: the same bits for less */
+        const bool lobed = lobes && batch->lobed[i / VW];
+        if (!glossy_light && !lobed) {
             vf_store(batch->e[0] + i, vf_load(batch->e[0] + i) + g * red);
             vf_store(batch->e[1] + i, vf_load(batch->e[1] + i) + g * green);
             vf_store(batch->e[2] + i, vf_load(batch->e[2] + i) + g * blue);
@@ -127,7 +132,7 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
             for (int k = 0; k < 3; k++) sent[k] = sent[k] * pass + vf_set1(light->power[k]) * lobe[k];
         }
         vf pass = one;
-        if (lobes) {
+        if (lobed) {
             es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
                 .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
             vf lobe[3];
