@@ -160,8 +160,8 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
             id++;
         if (id == OPTION_COUNT) {
             const char* nearest = demo_nearest(argument, option_names, OPTION_COUNT);
-            return demo_refuse("%s: unknown option %s; %s%s", command, argument,
-                nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "");
+            return demo_refuse("%s: unknown option %s; %s%s%s", command, argument,
+                nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "", nearest ? "?" : "");
         }
         bool takes_value = id != NO_SKIP && id != HASH;
         if (!takes_value && equals) return demo_refuse("%s: takes no value", option_names[id]);

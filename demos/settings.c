@@ -103,7 +103,7 @@ int demo_scenes(int count, char** arguments)
 int demo_images(int count, char** arguments)
 {
     if (expect_nothing("images", count, arguments) != DEMO_OK) return DEMO_BAD_INPUT;
-    for (size_t i = 0; i < es_image_name_count(); i++) printf("%-18s %s\n", es_image_name(i), es_image_description(i));
+    for (size_t i = 0; i < es_image_name_count(); i++) printf("%-20s %s\n", es_image_name(i), es_image_description(i));
     return DEMO_OK;
 }
 

@@ -6,7 +6,8 @@
 enum { FACES = 5 };
 
 /* At the map's centre a texel spans 4 / size radians, at its border 2 / size along the radius; a cube face of f texels has
- * 2 / f at its centre and half of that in its corners' direction: f = size is already finer everywhere but at the border. */
+ * 2 / f at its centre and half of that in its corners' direction. With f = 2 size every texel of the map has two or more of a face
+ * across, up to maps of 512; larger ones come close to one. */
 static uint32_t face_size(uint32_t size) { return 2 * size > 1024 ? 1024 : 2 * size; }
 
 size_t es_classic_scratch_floats(uint32_t size) { return (size_t)FACES * face_size(size) * face_size(size); }

@@ -185,7 +185,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
 {
     es_context* context = renderer->context;
     *image = (es_image){0};
-    if (!renderer->frames) return es_misuse(context, ES_WRONG_STATE, "image \"%s\": no frame has been rendered yet", name);
+    if (!renderer->complete) return es_misuse(context, ES_WRONG_STATE, "image \"%s\": no frame has been rendered, or the last one failed", name);
     int index = -1;
     for (int i = 0; i < IMAGE_COUNT; i++)
         if (strcmp(images[i].name, name) == 0) index = i;
@@ -195,7 +195,8 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     const es_gbuffer* g = &renderer->gbuffer;
     const es_light_view* light = renderer->light_count ? &renderer->light_views[0] : NULL;
     uint32_t width = g->width, height = g->height, channels = 3;
-    uint32_t shown_maps = renderer->maps.count < 64 ? renderer->maps.count : 64;
+    bool has_maps = renderer->plan.valid[ES_PASS_ISM] || renderer->plan.valid[ES_PASS_CLASSIC];
+    uint32_t shown_maps = !has_maps ? 0 : renderer->maps.count < 64 ? renderer->maps.count : 64;
     bool of_light = kind == IMAGE_LIGHT_ALBEDO || kind == IMAGE_LIGHT_NORMAL || kind == IMAGE_IMPORTANCE;
     if (kind == IMAGE_SHADOW_MAP && light) {
         width = light->faces[0].shadow_view.width * light->face_count;

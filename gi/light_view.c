@@ -40,7 +40,7 @@ static void face_views(es_light_view* view, uint32_t size, es_vec3 low, es_vec3 
         es_cube_views(size, light->position, view->near_plane, views);
     } else {
         float half_angle = es_acos(es_clampf(light->cos_outer, -1.0f, 1.0f));
-        /* one texel of margin on each side so that the filter at the cone's edge stays inside the map */
+        /* about two texels of margin on each side; wider filters repeat the map's border there */
         float margin = 1.0f + 4.0f / (float)size;
         float fov = 2.0f * es_clampf(half_angle * margin, 0.01f, 1.5f);
         views[0] = es_perspective_view(size, size, light->position, light->direction, any_up(light->direction), fov, view->near_plane);
@@ -103,6 +103,7 @@ es_result es_light_view_prepare(es_context* context, es_light_view* view, const 
     } else {
         view->power = strength * (float)ES_PI * 0.25f * extent * extent;
     }
+    view->power = es_minf(view->power, 1e30f); /* shares of lights are quotients of powers */
     return ES_OK;
 }
 
@@ -110,8 +111,10 @@ es_result es_light_view_draw_shadow(es_rasterizer* rasterizer, const es_draw_lis
 {
     for (uint32_t i = 0; i < view->face_count; i++) {
         es_light_face* face = &view->faces[i];
-        es_result result = es_draw_depth(rasterizer, list, &face->shadow_view, face->shadow_depth, face->shadow_view.width, stats);
+        es_raster_stats of_face = {0};
+        es_result result = es_draw_depth(rasterizer, list, &face->shadow_view, face->shadow_depth, face->shadow_view.width, &of_face);
         if (result) return result;
+        stats->triangles += of_face.triangles;
     }
     return ES_OK;
 }
@@ -120,8 +123,10 @@ es_result es_light_view_draw_gbuffer(es_rasterizer* rasterizer, const es_draw_li
 {
     for (uint32_t i = 0; i < view->face_count; i++) {
         es_light_face* face = &view->faces[i];
-        es_result result = es_draw_gbuffer(rasterizer, list, &face->gbuffer_view, &face->gbuffer, stats);
+        es_raster_stats of_face = {0};
+        es_result result = es_draw_gbuffer(rasterizer, list, &face->gbuffer_view, &face->gbuffer, &of_face);
         if (result) return result;
+        stats->triangles += of_face.triangles;
     }
     return ES_OK;
 }

@@ -33,6 +33,7 @@ typedef struct es_light_view_sizes { uint32_t shadow_size, light_size; bool gbuf
 /* Sets type, matrices and buffers for one light of a world with the given bounds; buffers are reallocated when sizes or the
  * number of faces change. */
 es_result es_light_view_prepare(es_context* context, es_light_view* view, const es_light_state* light, es_light_view_sizes sizes, es_vec3 bounds_min, es_vec3 bounds_max);
+/* Of the statistics, only triangles are counted, over all faces. */
 es_result es_light_view_draw_shadow(es_rasterizer* rasterizer, const es_draw_list* list, es_light_view* view, es_raster_stats* stats);
 es_result es_light_view_draw_gbuffer(es_rasterizer* rasterizer, const es_draw_list* list, es_light_view* view, es_raster_stats* stats);
 void es_light_view_free(es_context* context, es_light_view* view);

@@ -116,7 +116,7 @@ es_renderer_settings es_renderer_get_settings(const es_renderer* renderer) { ret
 static es_result resize_frame(es_renderer* renderer)
 {
     const es_renderer_settings* s = &renderer->settings;
-    if (renderer->gbuffer.width == s->width && renderer->gbuffer.height == s->height && renderer->display) return ES_OK;
+    if (renderer->gbuffer.width == s->width && renderer->gbuffer.height == s->height && renderer->display && renderer->direct.memory) return ES_OK;
     es_context* context = renderer->context;
     free_frame_buffers(renderer);
     es_plan_invalidate(&renderer->plan);
@@ -154,7 +154,7 @@ static es_result reserve_vpls(es_renderer* renderer, uint32_t count)
     if (count <= renderer->vpl_capacity) return ES_OK;
     es_context* context = renderer->context;
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
-    renderer->vpl_capacity = 0;
+    renderer->vpl_capacity = renderer->vpl_count = 0;
     renderer->vpls = es_allocate_array(context, count, sizeof *renderer->vpls);
     if (!renderer->vpls) return es_context_last_result(context);
     renderer->vpl_capacity = count;
@@ -292,6 +292,8 @@ static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
         /* about the squared distance between the grid's pixels on surfaces half the scene away */
         float softening = in->extent * 0.004f;
         es_receivers_collect(receivers, &r->gbuffer, &r->rays, softening * softening);
+    } else if (r->settings.view_importance && !result) {
+        result = es_context_last_result(r->context);
     }
     for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i], receivers);
     if (!result) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->vpl_count);
@@ -299,7 +301,8 @@ static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
     return result;
 }
 
-/* A point on the light's own surface must not shadow it: at twice the light G-buffer's texel that is out of reach. */
+/* What is closer to a light than this is its own surface: the position comes from a texel's centre and the normal is interpolated, so
+ * neighbouring triangles may rise a little above its horizon. */
 static float near_distance(const frame_inputs* in) { return in->extent * 2e-3f; }
 
 static es_result draw_classic_maps(es_renderer* r, const frame_inputs* in)
@@ -539,8 +542,11 @@ es_result es_renderer_render(es_renderer* renderer, es_world* world)
     es_fp_leave(environment);
     if (result) {
         es_plan_invalidate(&renderer->plan); /* a pass may have stopped halfway */
+        renderer->complete = false;
+        renderer->vpl_count = renderer->light_count = 0;
         return result;
     }
+    renderer->complete = true;
     renderer->stats.frame = renderer->frames++;
     renderer->stats.milliseconds = (es_seconds() - start) * 1e3;
     renderer->stats.passes = renderer->plan.stats;
@@ -571,7 +577,7 @@ size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t capaci
 size_t es_renderer_points(const es_renderer* renderer, uint32_t map, float* positions, size_t capacity)
 {
     const es_scene_points* points = &renderer->points;
-    if (!points->subset_count) return 0;
+    if (!points->subset_count || !renderer->plan.valid[ES_PASS_ISM]) return 0;
     size_t first = (size_t)(map % points->subset_count) * points->subset_size;
     for (size_t i = 0; i < points->subset_size && i < capacity; i++) {
         positions[3 * i] = points->x[first + i];

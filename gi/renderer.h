@@ -21,6 +21,7 @@ struct es_renderer {
     es_plan plan;
     es_frame_stats stats;
     uint64_t frames;
+    bool complete;             /* the last frame was rendered to its end */
 
     es_rasterizer* rasterizer;
     es_raster_view view;

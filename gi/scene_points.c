@@ -184,22 +184,28 @@ static void place_runs(void* user, uint32_t begin, uint32_t end, uint32_t worker
     }
 }
 
+static float volume_scale(const es_raster_instance* instance) { return es_absf(es_mat4_determinant3(&instance->transform)); }
+
 static bool same_triangles(const es_scene_points* points, const es_draw_list* list)
 {
     if (points->source_count != list->instance_count) return false;
-    for (uint32_t i = 0; i < list->instance_count; i++)
-        if (points->sources[i].mesh != list->instances[i].mesh || points->sources[i].triangle_count != list->instances[i].mesh->triangle_count) return false;
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        const struct es_point_source* source = &points->sources[i];
+        if (source->mesh != list->instances[i].mesh || source->triangle_count != list->instances[i].mesh->triangle_count) return false;
+        float now = volume_scale(&list->instances[i]);
+        if (now > 8.0f * source->volume_scale || source->volume_scale > 8.0f * now) return false;
+    }
     return true;
 }
 
 es_result es_scene_points_update(es_context* context, es_scene_points* points, const es_draw_list* list, uint32_t subset_size, uint32_t subset_count, uint64_t* moved)
 {
     *moved = 0;
-    bool fresh = !same_triangles(points, list) || (points->subset_count && (points->subset_size != subset_size || points->subset_count != subset_count));
+    bool fresh = points->subset_size != subset_size || points->subset_count != subset_count || !same_triangles(points, list);
     if (fresh) {
         es_release(context, points->sources, points->source_count * sizeof *points->sources);
         points->source_count = 0;
-        points->sources = es_allocate_array(context, list->instance_count, sizeof *points->sources);
+        points->sources = es_allocate_zero(context, list->instance_count * sizeof *points->sources);
         if (!points->sources) return es_context_last_result(context);
         es_result result = distribute(context, points, list, subset_size, subset_count);
         if (result) {
@@ -214,7 +220,7 @@ es_result es_scene_points_update(es_context* context, es_scene_points* points, c
     if (!stale) return es_context_last_result(context);
     for (uint32_t i = 0; i < list->instance_count; i++) {
         const es_raster_instance* instance = &list->instances[i];
-        struct es_point_source source = {instance->mesh, instance->mesh->triangle_count, instance->mesh->revision, instance->transform};
+        struct es_point_source source = {instance->mesh, instance->mesh->triangle_count, instance->mesh->revision, instance->transform, fresh ? volume_scale(instance) : points->sources[i].volume_scale};
         stale[i] = fresh || points->sources[i].revision != source.revision || memcmp(&points->sources[i].transform, &source.transform, sizeof source.transform) != 0;
         points->sources[i] = source;
     }

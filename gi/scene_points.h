@@ -19,11 +19,12 @@ typedef struct es_scene_points {
     size_t run_count, run_capacity;
     float area;                  /* world area when the points were distributed, m² */
     /* what the positions were computed from */
-    struct es_point_source { const es_raster_mesh* mesh; uint32_t triangle_count; uint64_t revision; es_mat4 transform; } * sources;
+    struct es_point_source { const es_raster_mesh* mesh; uint32_t triangle_count; uint64_t revision; es_mat4 transform; float volume_scale; } * sources;
     uint32_t source_count;
 } es_scene_points;
 
-/* Distributes points anew when the set of triangles changed, moves those of instances that moved; *moved says how many positions
+/* Distributes points anew when the set of triangles changed or an instance has grown or shrunk to twice or half the size it had when
+ * they were distributed (until then points keep their places, so that light does not flicker), moves those of instances that moved; *moved says how many positions
  * were computed. An empty list or a list without area gives no points. */
 es_result es_scene_points_update(es_context* context, es_scene_points* points, const es_draw_list* list, uint32_t subset_size, uint32_t subset_count, uint64_t* moved);
 void es_scene_points_free(es_context* context, es_scene_points* points);

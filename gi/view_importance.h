@@ -17,7 +17,7 @@ typedef struct es_receivers {
     uint32_t count;                /* a multiple of eight; what is left over has weight 0 */
     float x[ES_RECEIVERS_MAX], y[ES_RECEIVERS_MAX], z[ES_RECEIVERS_MAX];
     float nx[ES_RECEIVERS_MAX], ny[ES_RECEIVERS_MAX], nz[ES_RECEIVERS_MAX];
-    float weight[ES_RECEIVERS_MAX]; /* luminance of the albedo */
+    float weight[ES_RECEIVERS_MAX]; /* luminance of what the surface reflects, lobe included */
     float softening;               /* m², added to d²: about the squared distance between receivers */
 } es_receivers;
 

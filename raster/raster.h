@@ -94,7 +94,7 @@ typedef struct es_raster_mesh {
     const uint32_t* indices;          /* three per triangle, all < vertex_count; four more bytes must be readable past the end */
     uint32_t vertex_count, triangle_count;
     es_vec3 bounds_min, bounds_max;   /* of positions (and previous_positions) */
-    uint64_t revision;                /* differs whenever positions differ */
+    uint64_t revision;                /* differs whenever positions differ, in this mesh or from another mesh */
 } es_raster_mesh;
 
 typedef struct es_raster_instance {

@@ -1356,7 +1356,7 @@ class importer
         check(es_world_add_node(world, &node_desc, &desc.node));
         es_light light;
         check(es_world_add_light(world, &desc, &light));
-        es_log(context, ES_LOG_INFO, ES_NOTE, "%s: has no light; a directional light of 3 W/m² from above the camera's left shoulder was added", path);
+        es_log(context, ES_LOG_WARNING, ES_NOTE, "%s: has no light; a directional light of 3 W/m² from above the camera's left shoulder was added (world.default-light=false leaves it out)", path);
     }
 
     /* Rotation that turns z to the unit vector `back`, with y as upright as it can be. */
@@ -1437,7 +1437,7 @@ class importer
         check(es_world_add_node(world, &node_desc, &desc.node));
         es_camera camera;
         check(es_world_add_camera(world, &desc, &camera));
-        es_log(context, ES_LOG_INFO, ES_NOTE, "%s: has no camera; one that frames everything was added", path);
+        es_log(context, ES_LOG_WARNING, ES_NOTE, "%s: has no camera; one that frames everything was added", path);
         if (needs_light) {
             es_quat q = node_desc.transform.rotation;
             add_default_light(es_quat_rotate(q, {1, 0, 0}), es_quat_rotate(q, {0, 1, 0}), back);

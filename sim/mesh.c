@@ -117,6 +117,7 @@ static bool fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc
     size_t bytes = stream_bytes(count);
     mesh->raster.vertex_count = count;
     mesh->raster.triangle_count = desc->triangle_count;
+    mesh->raster.revision = es_context_next_serial(world->context);
     mesh->positions = es_allocate(context, bytes);
     mesh->indices = es_allocate(context, index_bytes(desc->triangle_count));
     if (!mesh->positions || !mesh->indices) return false;
@@ -250,6 +251,7 @@ es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* posit
         memcpy(object->positions + 4 * v, positions + 3 * from, 3 * sizeof(float));
         if (normals && direction_usable(normals + 3 * from)) memcpy(object->normals + 4 * v, normals + 3 * from, 3 * sizeof(float));
     }
+    object->raster.revision = es_context_next_serial(world->context);
     update_bounds(object);
     if (object->object.references) world->geometry_touched = world->list_dirty = true;
     return ES_OK;
@@ -268,8 +270,9 @@ void es_meshes_settle(es_world* world)
     }
 }
 
-void es_mesh_restored(es_mesh_object* mesh)
+void es_mesh_restored(es_world* world, es_mesh_object* mesh)
 {
+    mesh->raster.revision = es_context_next_serial(world->context);
     mesh->raster.previous_positions = mesh->moving ? mesh->previous : NULL;
     update_bounds(mesh);
 }

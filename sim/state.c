@@ -160,7 +160,7 @@ static void visit_mesh(es_world* world, state_io* io, es_mesh_object* mesh)
     if (io->mode != APPLY) return;
     mesh->deformed = deformed;
     mesh->moving = moving;
-    es_mesh_restored(mesh);
+    es_mesh_restored(world, mesh);
 }
 
 static void visit_clip(state_io* io, es_clip_object* clip)

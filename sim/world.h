@@ -133,7 +133,7 @@ bool es_transform_resolve(const es_transform* transform, es_transform* resolved)
 
 void es_clips_play(es_world* world);
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
-void es_mesh_restored(es_mesh_object* mesh);  /* after its streams were replaced */
+void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
 bool es_camera_desc_resolve(es_world* world, const es_camera_desc* desc, es_camera_desc* resolved);
 bool es_light_desc_resolve(es_world* world, const es_light_desc* desc, es_light_desc* resolved);
