@@ -377,6 +377,98 @@ static void test_empty_worlds(void** state)
     es_context_destroy(context);
 }
 
+/* how many of the first map's points lie higher than y */
+static int points_above(const es_renderer* renderer, float y)
+{
+    static float p[3 * 1024];
+    size_t count = es_renderer_points(renderer, 0, p, 1024);
+    int above = 0;
+    for (size_t i = 0; i < count; i++) above += p[3 * i + 1] > y;
+    return above;
+}
+
+/* The points that stand for the scene follow meshes that move and deform, and are shared out anew when one grows. */
+static void test_points_follow(void** state)
+{
+    (void)state;
+    es_context* context = context_of(2);
+    room r = make_room(context, ES_LIGHT_SPOT);
+    es_transform t = es_identity_transform();
+    t.translation = (es_vec3){0, 0.8f, 0};
+    t.scale = (es_vec3){0.02f, 0.02f, 0.02f};
+    assert_int_equal(es_world_set_node_transform(r.world, r.ball, &t), ES_OK);
+    es_renderer_settings s = small();
+    es_renderer* renderer;
+    assert_int_equal(es_renderer_create(context, &s, &renderer), ES_OK);
+    assert_int_equal(es_renderer_render(renderer, r.world), ES_OK);
+    assert_true(points_above(renderer, 0.2f) < 5);
+    t.scale = (es_vec3){1, 1, 1};
+    assert_int_equal(es_world_set_node_transform(r.world, r.ball, &t), ES_OK);
+    assert_int_equal(es_world_step(r.world, 0.1f), ES_OK);
+    assert_int_equal(es_renderer_render(renderer, r.world), ES_OK);
+    /* the ball has pi of pi + 16 m² */
+    int grown = points_above(renderer, 0.2f);
+    assert_in_range(grown, 120, 210);
+    assert_int_equal(points_above(renderer, 1.4f), 0);
+
+    uint32_t ids[4];
+    size_t count = 4;
+    assert_int_equal(es_world_enumerate(r.world, ES_OBJECT_MESH, ids, &count), ES_OK);
+    es_mesh ball = {ids[1]};
+    const es_raster_mesh* mesh = es_world_mesh(r.world, ball);
+    static float moved[3 * 4096];
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        for (int k = 0; k < 3; k++) moved[3 * v + (uint32_t)k] = mesh->positions[4 * v + (uint32_t)k] + (k == 1 ? 1.0f : 0.0f);
+    assert_int_equal(es_world_deform_mesh(r.world, ball, moved, NULL), ES_OK);
+    assert_int_equal(es_renderer_render(renderer, r.world), ES_OK);
+    assert_int_equal(points_above(renderer, 1.2f), grown);
+    es_renderer_destroy(renderer);
+    es_world_destroy(r.world);
+    es_context_destroy(context);
+}
+
+/* A frame that fails for want of memory leaves no image to read, and the next one that has it is whole. */
+static void test_memory_cap(void** state)
+{
+    (void)state;
+    int failed = 0, whole = 0;
+    uint64_t expected = 0;
+    for (size_t cap = 24 << 20; cap >= 1 << 20; cap = cap * 4 / 5) {
+        es_context_desc desc = es_default_context_desc();
+        desc.threads = 2;
+        desc.memory_cap = cap;
+        es_context* context;
+        assert_int_equal(es_context_create(&desc, &context), ES_OK);
+        room r = make_room(context, ES_LIGHT_SPOT);
+        es_renderer_settings s = small();
+        es_renderer* renderer;
+        es_result created = es_renderer_create(context, &s, &renderer);
+        es_image image;
+        if (created) assert_int_equal(created, ES_MEMORY_CAP);
+        for (int frame = 0; frame < 2 && !created; frame++) {
+            es_result result = es_renderer_render(renderer, r.world);
+            if (result == ES_OK) {
+                if (es_renderer_image(renderer, "direct", &image) == ES_OK) {
+                    uint64_t hash = es_image_hash(&image);
+                    if (!whole++) expected = hash;
+                    assert_int_equal(hash, expected);
+                    es_image_destroy(context, &image);
+                }
+            } else {
+                assert_int_equal(result, ES_MEMORY_CAP);
+                assert_int_equal(es_renderer_image(renderer, "importance", &image), ES_WRONG_STATE);
+                assert_int_equal(es_renderer_vpls(renderer, NULL, 0), 0);
+                failed++;
+            }
+        }
+        es_renderer_destroy(renderer);
+        es_world_destroy(r.world);
+        assert_int_equal(es_context_bytes(context), 0);
+        es_context_destroy(context);
+    }
+    assert_true(failed > 4 && whole > 0);
+}
+
 /* Settings outside their range are refused by name; sizes change between frames. */
 static void test_settings(void** state)
 {
@@ -458,6 +550,8 @@ int main(void)
         cmocka_unit_test(test_indirect_light),
         cmocka_unit_test(test_skipping),
         cmocka_unit_test(test_empty_worlds),
+        cmocka_unit_test(test_points_follow),
+        cmocka_unit_test(test_memory_cap),
         cmocka_unit_test(test_settings),
         cmocka_unit_test(test_warping),
     };
