@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* 32 random bits for (seed, counter): Philox-like mixing is not needed here; two rounds of a full-avalanche hash
+/* 32 random bits for (seed, counter): two rounds of a full-avalanche hash
  * (C. Wellons' lowbias32 constants) over both words. Passes the chi-square and serial tests in tests/. */
 static inline uint32_t es_hash_u32(uint32_t x)
 {

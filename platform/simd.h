@@ -278,7 +278,7 @@ VINL vi vi_gather(const void* base_address, vi index)
 }
 
 /* The record of four 32-bit words at base + stride * index[lane] (stride in bytes, alignment 4), transposed to four vectors.
- * Eight 16-byte loads and shuffles: on the processors measured about a third of the cost of four hardware gathers. */
+ * Eight 16-byte loads and shuffles instead of four hardware gathers, which load each lane's word by itself. */
 VINL void vi_gather4(const void* base, uint32_t stride, vi index, vi* a, vi* b, vi* c, vi* d)
 {
     const char* p = base;
