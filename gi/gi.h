@@ -116,6 +116,106 @@ ES_API size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t
 /* World positions of the points one imperfect shadow map is drawn from, 3 floats each. */
 ES_API size_t es_renderer_points(const es_renderer* renderer, uint32_t map, float* positions, size_t capacity);
 
+/* ---- reference: a progressive path tracer over the same world ------------------------------------------------------------------- */
+
+/* All of them by name through es_reference_settings_set. Every vertex of a path samples the lights and the surface, combined by
+ * multiple importance sampling (Veach 1997). Samples are a function of pixel and sample number alone: any number of threads, any
+ * instruction set and any split into calls or files give the same bits. */
+typedef struct es_reference_settings {
+    uint32_t width, height;   /* pixels */
+    uint32_t bounces;         /* indirect ones: 0 direct light only, 1 as ES_GI_ISM does, … */
+    uint32_t seed;
+    bool antialias;           /* rays over the pixel's area; off: through its centre, as the real-time methods sample */
+    bool emission;            /* glowing surfaces and the environment light others; off: as the real-time methods that cannot */
+    bool quantised;           /* the first hit's normal, colour and roughness are rounded as the G-buffer stores them */
+    uint32_t max_samples;     /* per pixel; 0: no limit */
+    float max_seconds;        /* 0: no limit */
+    float max_error;          /* relRMSE of the radiance by its own estimate; 0: no limit */
+} es_reference_settings;
+
+ES_API es_reference_settings es_default_reference_settings(void);
+ES_API size_t es_reference_setting_count(void);
+ES_API const es_setting* es_reference_setting(size_t index);
+ES_API es_result es_reference_settings_set(es_context* context, es_reference_settings* settings, const char* name, const char* value);
+
+typedef struct es_reference es_reference;
+/* settings NULL: defaults. SETTING_VALUE when one is outside its range. */
+ES_API es_result es_reference_create(es_context* context, const es_reference_settings* settings, es_reference** reference);
+ES_API void es_reference_destroy(es_reference* reference);
+/* Takes the world as its active camera sees it now and forgets all samples. What is needed of it is copied, so the world may move on. */
+ES_API es_result es_reference_begin(es_reference* reference, es_world* world);
+/* Adds at least one and at most `samples` samples per pixel, fewer when a limit of the settings is reached. */
+ES_API es_result es_reference_add(es_reference* reference, uint32_t samples);
+
+typedef struct es_reference_stats {
+    uint64_t samples;         /* per pixel, so far */
+    uint64_t rays;            /* traced, so far */
+    double seconds;           /* spent in es_reference_add since es_reference_begin or es_reference_resume */
+    double build_seconds;     /* of the hierarchy */
+    double error;             /* estimated relRMSE of the radiance; infinite before there is an estimate */
+    double seconds_left;      /* to the first limit that will be reached, by the time per sample so far; infinite without one */
+    bool done;                /* a limit is reached */
+} es_reference_stats;
+ES_API es_reference_stats es_reference_get_stats(const es_reference* reference);
+
+/* "radiance" (everything), "emission" (seen directly), "direct", "indirect" (the sum of all bounces), "bounce-1" … "bounce-64", and with
+ * "-error" appended the standard error of each, per pixel and channel. The caller destroys the image. */
+ES_API es_result es_reference_image(es_reference* reference, const char* name, es_image* image);
+/* Writes an EXR whose R, G, B are the radiance; further channels hold the other images and the accumulators. */
+ES_API es_result es_reference_save(es_reference* reference, const char* path);
+/* After es_reference_begin: goes on where the file stopped. FILE_UNSUPPORTED when it was made from another world, camera or settings. */
+ES_API es_result es_reference_resume(es_reference* reference, const char* path);
+
+/* ---- error: how far a picture is from the truth ------------------------------------------------------------------------------------ */
+
+/* Of a picture A against a reference B, over all pixels and the channels compared, with d = A - B. Deterministic: own elementary
+ * functions, sums in double in pixel order. A pair that is not finite counts as infinite error unless both are the same. */
+typedef struct es_image_error {
+    double rmse;              /* sqrt(mean(d²)) */
+    double relrmse;           /* rmse / mean(B) */
+    double relmse;            /* mean(d² / (B² + 0.01)) (Rousselle et al. 2011) */
+    double rell1;             /* mean(|d|) / mean(B) */
+    double flip;              /* mean ꟻLIP 0 … 1 (Andersson et al. 2020), after the tone map of the display; NaN with fewer than three channels */
+    double hdr_flip;          /* mean HDR-ꟻLIP (Andersson et al. 2021), over the exposures it chooses; NaN likewise */
+    double max;               /* largest |d| */
+    double mean, reference_mean;
+    uint64_t samples;         /* compared values */
+} es_image_error;
+
+typedef struct es_error_desc {
+    bool flip;                /* compute flip and hdr_flip, which take longer than all the others */
+    float pixels_per_degree;  /* of the viewer; 0: 67.0206, a 0.7 m wide screen of 3840 pixels seen from 0.7 m */
+    bool display_referred;    /* A and B are linear 0 … 1 (a PNG): flip takes them as they are and hdr_flip is NaN */
+    const uint8_t* mask;      /* one byte per pixel, zero leaves it out; NULL: all. ꟻLIP filters over all pixels and averages over these */
+} es_error_desc;
+
+/* Channels of the same name are compared, alpha only when there is nothing else; by position when no name is shared and the counts
+ * are equal. INVALID_ARGUMENT when the sizes differ or nothing can be compared. desc NULL: everything, no mask. */
+ES_API es_result es_image_compare(es_context* context, const es_image* a, const es_image* b, const es_error_desc* desc, es_image_error* error);
+
+typedef enum es_error_map { ES_ERROR_MAP_ABSOLUTE, ES_ERROR_MAP_RELATIVE, ES_ERROR_MAP_SIGNED, ES_ERROR_MAP_FLIP, ES_ERROR_MAP_HDR_FLIP } es_error_map;
+/* The error of each pixel as one channel (SIGNED: mean of d over channels; others: >= 0). The caller destroys it. */
+ES_API es_result es_image_error_map(es_context* context, const es_image* a, const es_image* b, es_error_map map, const es_error_desc* desc, es_image* result);
+/* One channel to false colour, sRGB samples: 0 … scale from black over blue, red and yellow to white, lightness rising all the way;
+ * SIGNED maps from blue (-scale) over black to red-yellow (+scale). */
+ES_API es_result es_image_false_colour(es_context* context, const es_image* values, float scale, bool is_signed, es_image* result);
+
+/* Flicker of a sequence: the error of the change from frame to frame. With dA = A(t) - A(t-1), dB likewise:
+ *   flicker = sqrt(mean((dA - dB)²)) / mean(B), over all pixels, channels and pairs of frames. */
+typedef struct es_flicker es_flicker;
+ES_API es_result es_flicker_create(es_context* context, es_flicker** flicker);
+ES_API void es_flicker_destroy(es_flicker* flicker);
+/* The next frame of both; the images are not kept. */
+ES_API es_result es_flicker_add(es_flicker* flicker, const es_image* a, const es_image* b);
+typedef struct es_flicker_error {
+    double flicker;           /* as above; NaN before there are two frames */
+    double worst;             /* of one pair of frames */
+    uint64_t worst_frame;     /* the later one of it, counted from 0 */
+    double change;            /* sqrt(mean(dB²)) / mean(B): what the reference itself changes */
+    uint64_t frames;
+} es_flicker_error;
+ES_API es_flicker_error es_flicker_result(const es_flicker* flicker);
+
 #ifdef __cplusplus
 }
 #endif

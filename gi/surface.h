@@ -104,4 +104,19 @@ static inline es_vec3 es_surface_evaluate(const es_surface* s, es_vec3 n, es_vec
     return es_v3(s->albedo.x * pass + lobe.x, s->albedo.y * pass + lobe.y, s->albedo.z * pass + lobe.z);
 }
 
+/* ---- sampling -------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct es_surface_sample {
+    es_vec3 wi;       /* unit */
+    es_vec3 weight;   /* f(wi, wo) cos / density */
+    float density;    /* of wi, 1/sr, over both parts */
+} es_surface_sample;
+
+/* A direction from three numbers in [0, 1): the cosine hemisphere for the diffuse part, visible normals for the GGX lobe (Heitz 2018),
+ * the power cosine about the mirror direction for Phong's; the part is chosen by its share of the albedo at wo. False when the surface
+ * reflects nothing towards wo or the sample falls below the surface. */
+bool es_surface_sample_direction(const es_surface* s, es_vec3 n, es_vec3 wo, const float u[3], es_surface_sample* sample);
+/* The density with which the above returns wi, 1/sr; integrates to 1 or less (what falls below the surface is lost). */
+float es_surface_density(const es_surface* s, es_vec3 n, es_vec3 wi, es_vec3 wo);
+
 #endif

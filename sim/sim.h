@@ -158,6 +158,19 @@ ES_API es_result es_world_add_light(es_world* world, const es_light_desc* desc, 
 ES_API es_result es_world_set_light(es_world* world, es_light light, const es_light_desc* desc);
 ES_API es_result es_world_get_light(const es_world* world, es_light light, es_light_desc* desc);
 
+/* ---- environment: light from everywhere, infinitely far away --------------------------------------------------------------------------------- */
+
+/* A world has at most one. It lights the reference's paths and is what they see where nothing else is; the real-time methods leave it black. */
+typedef struct es_environment_desc {
+    const es_image* image;    /* lat-long, linear radiance, three channels or more: the row's centre has the elevation, top +y; the middle
+                               * column looks along -z, columns to the right turn towards +x. Copied. NULL: the same radiance everywhere */
+    float radiance[3];        /* factor, W/(m² sr); all zero: no environment */
+    float rotation;           /* radians about +y, counter-clockwise seen from above */
+} es_environment_desc;
+ES_API es_result es_world_set_environment(es_world* world, const es_environment_desc* desc); /* NULL: none */
+/* False when there is none. The image is the world's own copy and valid until the next call that changes the world. */
+ES_API bool es_world_get_environment(const es_world* world, es_environment_desc* desc);
+
 /* ---- clips ------------------------------------------------------------------------------------------------------------------------------------ */
 
 typedef enum es_clip_path { ES_CLIP_TRANSLATION, ES_CLIP_ROTATION, ES_CLIP_SCALE } es_clip_path;
