@@ -167,7 +167,10 @@ typedef struct es_environment_desc {
     float radiance[3];        /* factor, W/(m² sr); all zero: no environment */
     float rotation;           /* radians about +y, counter-clockwise seen from above */
 } es_environment_desc;
-ES_API es_result es_world_set_environment(es_world* world, const es_environment_desc* desc); /* NULL: none */
+/* NULL: none. INVALID_ARGUMENT when a number is negative, beyond 1e12 or not finite, or the image has fewer than three channels. R, G and
+ * B are found by their names, or else the first three are taken. Counts as a change of the lights. Radiance and rotation are part of the
+ * saved state; the image is an asset. */
+ES_API es_result es_world_set_environment(es_world* world, const es_environment_desc* desc);
 /* False when there is none. The image is the world's own copy and valid until the next call that changes the world. */
 ES_API bool es_world_get_environment(const es_world* world, es_environment_desc* desc);
 

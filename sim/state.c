@@ -176,6 +176,20 @@ static void visit_clip(state_io* io, es_clip_object* clip)
     clip->start = start;
 }
 
+/* The image is an asset; its size is in the signature of the content. */
+static void visit_environment(es_world* world, state_io* io)
+{
+    float radiance[3], rotation = world->environment_rotation;
+    memcpy(radiance, world->environment_radiance, sizeof radiance);
+    visit_floats(io, radiance, 3);
+    visit_floats(io, &rotation, 1);
+    if (!reading(io) || !io->good) return;
+    io->good = es_environment_numbers_valid(radiance, rotation);
+    if (!io->good || io->mode != APPLY) return;
+    const es_image* image = world->environment_image.pixels ? &world->environment_image : NULL;
+    es_world_set_environment(world, &(es_environment_desc){.image = image, .radiance = {radiance[0], radiance[1], radiance[2]}, .rotation = rotation});
+}
+
 static void visit_world(es_world* world, state_io* io)
 {
     double time = world->time;
@@ -191,6 +205,7 @@ static void visit_world(es_world* world, state_io* io)
         world->active_camera = active;
         world->camera_dirty = world->nodes_moving = world->list_dirty = true;
     }
+    visit_environment(world, io);
     static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_MESH};
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++)
         for (uint32_t slot = 0; slot < world->slots[kinds[k]].slot_count && (io->good || !reading(io)); slot++) {
@@ -224,11 +239,12 @@ static uint64_t content_signature(const es_world* world)
         }
         hash = es_hash_bytes(hash, &kind, sizeof kind);
     }
-    return hash;
+    uint32_t environment[2] = {world->environment_image.width, world->environment_image.height};
+    return es_hash_bytes(hash, environment, sizeof environment);
 }
 
 typedef struct state_header { char magic[8]; uint64_t content, payload; } state_header;
-static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '1'};
+static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '2'};
 
 es_result es_world_save(const es_world* world, void* buffer, size_t* size)
 {

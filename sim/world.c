@@ -107,6 +107,7 @@ void es_world_destroy(es_world* world)
         if (clip) es_world_destroy_clip(world, (es_clip){clip->object.id});
     }
     for (int kind = 0; kind < ES_OBJECT_KINDS; kind++) es_slots_free(context, &world->slots[kind]);
+    es_environment_free(world);
     es_release(context, world->order, world->order_capacity * sizeof *world->order);
     es_release(context, world->drawn, world->drawn_capacity * sizeof *world->drawn);
     es_release(context, world->materials, world->material_capacity * sizeof *world->materials);

@@ -98,6 +98,9 @@ struct es_world {
     size_t light_capacity, light_count;
     bool lights_dirty;
 
+    es_image environment_image;    /* three channels; no pixels: the same radiance everywhere */
+    float environment_radiance[3], environment_rotation;
+
     es_camera_state camera_state;
     bool camera_dirty, camera_moving;
 
@@ -136,6 +139,9 @@ bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
 void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
 bool es_camera_desc_resolve(es_world* world, const es_camera_desc* desc, es_camera_desc* resolved);
+/* Of a saved state: does it hold what es_world_set_environment would take? */
+bool es_environment_numbers_valid(const float radiance[3], float rotation);
+void es_environment_free(es_world* world);
 bool es_light_desc_resolve(es_world* world, const es_light_desc* desc, es_light_desc* resolved);
 
 /* Last act of opening a scene or file: chooses camera and clips by the settings, poses the clips at time 0, makes that

@@ -516,6 +516,69 @@ static void settings(void** state)
     assert_int_equal(es_world_create_scene(c, "cornell", &s, &w), ES_SETTING_VALUE);
 }
 
+/* ---- environment ------------------------------------------------------------------------------------------------------------------------- */
+
+static void environment(void** state)
+{
+    fixture* f = *state;
+    es_world* w = f->world;
+    es_environment_desc got;
+    assert_false(es_world_get_environment(w, &got));
+    uint64_t lights = es_world_get_revisions(w).lights;
+    assert_int_equal(es_world_set_environment(w, NULL), ES_OK);
+    assert_true(es_world_get_revisions(w).lights == lights); /* none it was, none it is */
+
+    es_image image;
+    assert_int_equal(es_image_create(f->context, 4, 2, 4, &image), ES_OK);
+    for (int i = 0; i < 32; i++) image.pixels[i] = (float)i;
+    es_environment_desc desc = {.image = &image, .radiance = {1, 2, 3}, .rotation = 0.5f};
+    assert_int_equal(es_world_set_environment(w, &desc), ES_OK);
+    assert_true(es_world_get_revisions(w).lights > lights);
+    image.pixels[5] = 100; /* the world has its own */
+    assert_true(es_world_get_environment(w, &got));
+    assert_true(got.radiance[1] == 2 && got.rotation == 0.5f && got.image->width == 4 && got.image->height == 2 && got.image->channels == 3);
+    assert_true(got.image->pixels[4] == 5 && got.image->pixels[23] == 30);
+
+    /* channels as a file with its own order names them */
+    for (int c = 0; c < 4; c++) image.channel_names[c][0] = "ABGR"[c];
+    assert_int_equal(es_world_set_environment(w, &desc), ES_OK);
+    assert_true(es_world_get_environment(w, &got) && got.image->pixels[0] == 3 && got.image->pixels[2] == 1);
+
+    lights = es_world_get_revisions(w).lights;
+    uint64_t hash = es_world_hash(w);
+    struct { float radiance, rotation, pixel; } wrong[] = {{-1, 0, 0}, {NAN, 0, 0}, {INFINITY, 0, 0}, {1, NAN, 0}, {1, 1e9f, 0}, {1, 0, -1e-3f}, {1, 0, NAN}, {1, 0, INFINITY}};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        es_environment_desc bad = {.image = &image, .radiance = {1, 1, wrong[i].radiance}, .rotation = wrong[i].rotation};
+        image.pixels[9] = wrong[i].pixel;
+        assert_int_equal(es_world_set_environment(w, &bad), ES_INVALID_ARGUMENT);
+    }
+    image.channels = 2;
+    assert_int_equal(es_world_set_environment(w, &desc), ES_INVALID_ARGUMENT);
+    image.channels = 4;
+    assert_true(es_world_get_revisions(w).lights == lights && es_world_hash(w) == hash); /* a refused one changes nothing */
+
+    /* its factor and rotation are state, its image is not */
+    size_t size = 0;
+    assert_int_equal(es_world_save(w, NULL, &size), ES_OK);
+    void* saved = malloc(size);
+    assert_int_equal(es_world_save(w, saved, &size), ES_OK);
+    assert_true(es_world_get_environment(w, &got));
+    got.radiance[0] = 7;
+    got.rotation = -1;
+    assert_int_equal(es_world_set_environment(w, &got), ES_OK); /* the world's own image may be given back */
+    assert_true(got.image->pixels[0] == 3 && es_world_hash(w) != hash);
+    assert_int_equal(es_world_restore(w, saved, size), ES_OK);
+    assert_true(es_world_hash(w) == hash && es_world_get_environment(w, &got) && got.radiance[0] == 1 && got.rotation == 0.5f && got.image);
+    desc.image = NULL;
+    assert_int_equal(es_world_set_environment(w, &desc), ES_OK);
+    assert_true(es_world_get_environment(w, &got) && !got.image);
+    assert_int_equal(es_world_restore(w, saved, size), ES_WRONG_STATE);
+    assert_int_equal(es_world_set_environment(w, NULL), ES_OK);
+    assert_false(es_world_get_environment(w, &got));
+    free(saved);
+    es_image_destroy(f->context, &image);
+}
+
 /* ---- saved states ---------------------------------------------------------------------------------------------------------------------- */
 
 static void saving(void** state)
@@ -728,7 +791,7 @@ int main(void)
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         TEST(handles), TEST(references), TEST(refusals), TEST(meshes), TEST(deforming), TEST(tree), TEST(previous_pose), TEST(lights), TEST(clips),
-        TEST(settings), TEST(saving), TEST(scenes), TEST(closed_meshes), TEST(cornell_stays_inside), TEST(determinism), TEST(little_memory),
+        TEST(settings), TEST(environment), TEST(saving), TEST(scenes), TEST(closed_meshes), TEST(cornell_stays_inside), TEST(determinism), TEST(little_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
