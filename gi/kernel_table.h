@@ -7,6 +7,7 @@
 #include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/pixel_rays.h"
+#include "gi/reference/bvh.h"
 #include "gi/shade.h"
 #include "gi/view_importance.h"
 #include "gi/vpl.h"
@@ -21,7 +22,9 @@
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
     /* the block whose first pixel is (x, y) */                                                                  \
-    X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))
+    X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
+    X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
+    X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))
 
 struct es_gi_kernels {
 #define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;

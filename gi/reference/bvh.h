@@ -5,7 +5,8 @@
  * hits at least one of its triangles. Both faces are hit; what a back face means is for the caller.
  *
  * The same rays give the same hits, bit for bit, on every instruction set and for any number of threads. Where two triangles are hit
- * at the same distance the lower primitive wins.
+ * at the same distance the lower primitive wins; of overlapping triangles in one plane, whose distances differ by rounding only, always the
+ * same one.
  */
 #ifndef EARTHSHINE_GI_REFERENCE_BVH_H
 #define EARTHSHINE_GI_REFERENCE_BVH_H
