@@ -142,9 +142,11 @@ typedef struct es_reference es_reference;
 /* settings NULL: defaults. SETTING_VALUE when one is outside its range. */
 ES_API es_result es_reference_create(es_context* context, const es_reference_settings* settings, es_reference** reference);
 ES_API void es_reference_destroy(es_reference* reference);
-/* Takes the world as its active camera sees it now and forgets all samples. What is needed of it is copied, so the world may move on. */
+/* Takes the world as its active camera sees it now and forgets all samples. The world must outlive the samples and stay as it is, but for
+ * its camera: its meshes and textures are read, not copied. */
 ES_API es_result es_reference_begin(es_reference* reference, es_world* world);
-/* Adds at least one and at most `samples` samples per pixel, fewer when a limit of the settings is reached. */
+/* Adds `samples` samples per pixel, fewer when es_reference_settings.max_samples is reached and none when another limit is; the other limits
+ * are looked at between calls, so calls should be short. WRONG_STATE when the world has changed since es_reference_begin. */
 ES_API es_result es_reference_add(es_reference* reference, uint32_t samples);
 
 typedef struct es_reference_stats {

@@ -247,7 +247,7 @@ typedef struct part_plan {
     exr_compression_t compression;
     const exr_attr_chlist_t* channels;
     uint32_t first;                               /* channel of the image where this part begins */
-    uint8_t place[ES_IMAGE_MAX_CHANNELS];         /* file channel to channel of the image */
+    uint16_t place[ES_IMAGE_MAX_CHANNELS];        /* file channel to channel of the image */
     int luminance[3];                             /* file channels Y, RY, BY, or -1 */
     int rgb[3];                                   /* file channels R, G, B, or -1 */
 } part_plan;
@@ -339,11 +339,11 @@ static void place_channels(part_plan* plan, uint32_t first)
     uint32_t next = plan->first = first;
     for (int k = 0; k < 5; k++) {
         if (leading[k] < 0 || placed[leading[k]]) continue;
-        plan->place[leading[k]] = (uint8_t)next++;
+        plan->place[leading[k]] = (uint16_t)next++;
         placed[leading[k]] = true;
     }
     for (int c = 0; c < plan->channels->num_channels; c++) {
-        if (!placed[c]) plan->place[c] = (uint8_t)next++;
+        if (!placed[c]) plan->place[c] = (uint16_t)next++;
     }
 }
 

@@ -140,7 +140,7 @@ typedef struct es_mat4 { float m[16]; } es_mat4;       /* m[4 * column + row] */
 
 /* ---- images ------------------------------------------------------------------------------------------------------- */
 
-enum { ES_IMAGE_MAX_SIZE = 16384, ES_IMAGE_MAX_CHANNELS = 64, ES_CHANNEL_NAME_SIZE = 64 };
+enum { ES_IMAGE_MAX_SIZE = 16384, ES_IMAGE_MAX_CHANNELS = 1024, ES_CHANNEL_NAME_SIZE = 64 };
 
 /* Float image, row-major, top row first, channels interleaved: pixels[(y * width + x) * channels + c].
  * Colour is linear Rec.709 unless said otherwise. Owned by whoever created it; freed with es_image_destroy. */

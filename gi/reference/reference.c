@@ -1,0 +1,314 @@
+/* The reference's life: settings, the film, adding samples, images of what has been summed. */
+#include "gi/reference/reference.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "platform/context.h"
+#include "platform/random.h"
+#include "platform/settings.h"
+
+#define AT(field) offsetof(es_reference_settings, field)
+enum { MAX_BOUNCES = 64 };
+
+static const es_setting reference_table[] = {
+    {"reference.width", ES_SETTING_INT, "1024", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(width)},
+    {"reference.height", ES_SETTING_INT, "768", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(height)},
+    {"reference.bounces", ES_SETTING_INT, "1", 0, MAX_BOUNCES, NULL, "indirect bounces", AT(bounces)},
+    {"reference.seed", ES_SETTING_INT, "0", 0, 1000000, NULL, "of the random numbers", AT(seed)},
+    {"reference.antialias", ES_SETTING_BOOL, "false", 0, 1, NULL, "rays over the pixel's area instead of through its centre", AT(antialias)},
+    {"reference.emission", ES_SETTING_BOOL, "true", 0, 1, NULL, "glowing surfaces and the environment light others", AT(emission)},
+    {"reference.quantised", ES_SETTING_BOOL, "false", 0, 1, NULL, "first hits are rounded as the G-buffer stores them", AT(quantised)},
+    {"reference.samples", ES_SETTING_INT, "0", 0, 16777216, NULL, "per pixel at most, 0 no limit", AT(max_samples)},
+    {"reference.seconds", ES_SETTING_FLOAT, "0", 0, 1e9, NULL, "at most, 0 no limit", AT(max_seconds)},
+    {"reference.error", ES_SETTING_FLOAT, "0", 0, 1000, NULL, "relRMSE of the radiance by its own estimate to stop at, 0 no limit", AT(max_error)},
+};
+enum { SETTINGS = sizeof reference_table / sizeof reference_table[0] };
+
+size_t es_reference_setting_count(void) { return SETTINGS; }
+const es_setting* es_reference_setting(size_t index) { return index < SETTINGS ? &reference_table[index] : NULL; }
+
+es_reference_settings es_default_reference_settings(void)
+{
+    es_reference_settings settings = {0};
+    es_settings_defaults(reference_table, SETTINGS, &settings);
+    return settings;
+}
+
+es_result es_reference_settings_set(es_context* context, es_reference_settings* settings, const char* name, const char* value)
+{
+    return es_settings_set(context, reference_table, SETTINGS, settings, name, value);
+}
+
+/* ---- life ----------------------------------------------------------------------------------------------------------------------------- */
+
+es_result es_reference_create(es_context* context, const es_reference_settings* settings, es_reference** out)
+{
+    *out = NULL;
+    es_reference_settings resolved = settings ? *settings : es_default_reference_settings();
+    es_result result = es_settings_check(context, reference_table, SETTINGS, &resolved);
+    if (result) return result;
+    es_reference* r = es_allocate_zero(context, sizeof *r);
+    if (!r) return es_context_last_result(context);
+    r->context = context;
+    r->settings = resolved;
+    es_context_count_object(context, 1);
+    *out = r;
+    return ES_OK;
+}
+
+uint32_t es_reference_image_count(const es_reference* r) { return r->bounces + 2; }
+uint32_t es_reference_square_count(const es_reference* r) { return r->bounces + 3; }
+
+static size_t value_count(const es_reference* r) { return (size_t)r->width * r->height * 3; }
+
+static void free_film(es_reference* r)
+{
+    es_release(r->context, r->sums, value_count(r) * es_reference_image_count(r) * sizeof *r->sums);
+    es_release(r->context, r->squares, value_count(r) * es_reference_square_count(r) * sizeof *r->squares);
+    es_release(r->context, r->row_rays, r->height * sizeof *r->row_rays);
+    r->sums = NULL;
+    r->squares = NULL;
+    r->row_rays = NULL;
+    r->width = r->height = 0;
+}
+
+void es_reference_destroy(es_reference* r)
+{
+    if (!r) return;
+    es_context* context = r->context;
+    es_trace_scene_free(&r->scene);
+    free_film(r);
+    es_release(context, r, sizeof *r);
+    es_context_count_object(context, -1);
+}
+
+void es_reference_forget(es_reference* r)
+{
+    memset(r->sums, 0, value_count(r) * es_reference_image_count(r) * sizeof *r->sums);
+    memset(r->squares, 0, value_count(r) * es_reference_square_count(r) * sizeof *r->squares);
+    r->stats = (es_reference_stats){.build_seconds = r->stats.build_seconds, .error = __builtin_inf(), .seconds_left = __builtin_inf()};
+    r->resumed_samples = 0;
+}
+
+static es_result begin(es_reference* r, es_world* world)
+{
+    es_camera camera = es_world_active_camera(world);
+    if (!camera.id) return es_misuse(r->context, ES_WRONG_STATE, "the world has no active camera; es_world_set_active_camera chooses one");
+    es_result result = es_world_camera_view(world, camera, r->settings.width, r->settings.height, &r->view);
+    if (result) return result;
+    r->rays = es_pixel_rays_of_view(&r->view);
+    double start = es_seconds();
+    result = es_trace_scene_take(&r->scene, world, r->settings.emission);
+    if (result) return result;
+    double built = es_seconds() - start;
+    free_film(r);
+    r->width = r->settings.width;
+    r->height = r->settings.height;
+    r->bounces = r->settings.bounces;
+    r->sums = es_allocate_array(r->context, value_count(r) * es_reference_image_count(r), sizeof *r->sums);
+    if (r->sums) r->squares = es_allocate_array(r->context, value_count(r) * es_reference_square_count(r), sizeof *r->squares);
+    if (r->squares) r->row_rays = es_allocate_zero(r->context, r->height * sizeof *r->row_rays);
+    if (!r->row_rays) return es_context_last_result(r->context);
+    r->world = world;
+    r->revisions = es_world_get_revisions(world);
+    r->stats.build_seconds = built;
+    es_reference_forget(r);
+    r->fingerprint = es_reference_fingerprint(r);
+    r->begun = true;
+    return ES_OK;
+}
+
+es_result es_reference_begin(es_reference* r, es_world* world)
+{
+    if (!world || es_world_context(world) != r->context) return es_misuse(r->context, ES_INVALID_ARGUMENT, "the reference and the world must share one context");
+    r->begun = false;
+    es_fp_environment environment = es_fp_enter();
+    es_result result = begin(r, world);
+    es_fp_leave(environment);
+    if (!result) return ES_OK;
+    es_trace_scene_free(&r->scene);
+    free_film(r);
+    return result;
+}
+
+/* ---- samples ---------------------------------------------------------------------------------------------------------------------------- */
+
+static void add(es_film_sum* s, float value)
+{
+    float sum = s->sum + value;
+    s->lost += es_absf(s->sum) >= es_absf(value) ? (s->sum - sum) + value : (value - sum) + s->sum;
+    s->sum = sum;
+}
+
+typedef struct sample_job { es_reference* r; uint32_t first, count; } sample_job;
+
+static void sample_rows(void* user, uint32_t begin_row, uint32_t end_row, uint32_t worker)
+{
+    sample_job* job = user;
+    es_reference* r = job->r;
+    const size_t plane = value_count(r);
+    es_vec3 bounce[MAX_BOUNCES + 1];
+    for (uint32_t y = begin_row; y < end_row; y++) {
+        uint64_t rays = 0;
+        for (uint32_t x = 0; x < r->width; x++) {
+            uint32_t pixel = y * r->width + x, seed = es_random_u32(r->settings.seed, pixel);
+            es_path_start start;
+            for (uint32_t i = 0; i < job->count; i++) {
+                uint32_t sample = job->first + i;
+                if (r->settings.antialias) {
+                    float u[2];
+                    es_path_numbers(seed, 0xffffu, sample, u);
+                    es_path_begin(&r->scene, &r->rays, (float)x + u[0] - 0.5f, (float)y + u[1] - 0.5f, r->settings.quantised, &start);
+                } else if (!i) {
+                    es_path_begin(&r->scene, &r->rays, (float)x, (float)y, r->settings.quantised, &start);
+                }
+                rays += 1 + es_path_trace(&r->scene, &start, r->bounces, seed, sample, bounce);
+                float total[3] = {start.emission.x, start.emission.y, start.emission.z}, indirect[3] = {0, 0, 0};
+                for (int k = 0; k < 3; k++) add(&r->sums[(size_t)pixel * 3 + k], total[k]);
+                for (uint32_t b = 0; b <= r->bounces; b++) {
+                    const float value[3] = {bounce[b].x, bounce[b].y, bounce[b].z};
+                    for (int k = 0; k < 3; k++) {
+                        size_t at = (size_t)pixel * 3 + k;
+                        add(&r->sums[(b + 1) * plane + at], value[k]);
+                        r->squares[b * plane + at] += value[k] * value[k];
+                        total[k] += value[k];
+                        if (b) indirect[k] += value[k];
+                    }
+                }
+                for (int k = 0; k < 3; k++) {
+                    size_t at = (size_t)pixel * 3 + k;
+                    r->squares[(r->bounces + 1) * plane + at] += indirect[k] * indirect[k];
+                    r->squares[(r->bounces + 2) * plane + at] += total[k] * total[k];
+                }
+            }
+        }
+        r->row_rays[y] = rays;
+    }
+}
+
+float es_reference_mean(const es_reference* r, uint32_t image, size_t at)
+{
+    const es_film_sum* s = &r->sums[image * value_count(r) + at];
+    return (s->sum + s->lost) / (float)r->stats.samples;
+}
+
+/* Variance of the mean from that of single samples. Stratified samples do better than independent ones, so this errs on the safe side. */
+static float variance_of_mean(const es_reference* r, uint32_t square, size_t at, float mean)
+{
+    double n = (double)r->stats.samples;
+    if (n < 2) return __builtin_inff();
+    double v = ((double)r->squares[square * value_count(r) + at] / n - (double)mean * mean) / (n - 1);
+    return v > 0.0 ? (float)v : 0.0f;
+}
+
+static float radiance_mean(const es_reference* r, size_t at, uint32_t first_image)
+{
+    float mean = 0.0f;
+    for (uint32_t i = first_image; i < es_reference_image_count(r); i++) mean += es_reference_mean(r, i, at);
+    return mean;
+}
+
+static void estimate_error(es_reference* r)
+{
+    if (r->stats.samples < 2) {
+        r->stats.error = __builtin_inf();
+        return;
+    }
+    double variance = 0.0, mean = 0.0;
+    for (size_t at = 0; at < value_count(r); at++) {
+        float m = radiance_mean(r, at, 0);
+        variance += variance_of_mean(r, r->bounces + 2, at, m);
+        mean += m;
+    }
+    double n = (double)value_count(r);
+    r->stats.error = variance > 0.0 ? __builtin_sqrt(variance / n) / (mean / n) : 0.0;
+}
+
+static void estimate_time(es_reference* r)
+{
+    es_reference_stats* s = &r->stats;
+    const es_reference_settings* limit = &r->settings;
+    double fresh = (double)(s->samples - r->resumed_samples), each = fresh > 0 ? s->seconds / fresh : 0.0, left = __builtin_inf();
+    if (limit->max_samples) left = each * ((double)limit->max_samples - (double)s->samples);
+    if (limit->max_seconds > 0.0f && (double)limit->max_seconds - s->seconds < left) left = (double)limit->max_seconds - s->seconds;
+    if (limit->max_error > 0.0f && s->error < __builtin_inf()) {
+        double ratio = s->error / (double)limit->max_error, more = each * (double)s->samples * (ratio * ratio - 1.0);
+        if (more < left) left = more;
+    }
+    s->seconds_left = left > 0.0 ? left : 0.0;
+    s->done = (limit->max_samples && s->samples >= limit->max_samples) || (limit->max_seconds > 0.0f && s->seconds >= (double)limit->max_seconds) ||
+              (limit->max_error > 0.0f && s->error <= (double)limit->max_error);
+}
+
+void es_reference_estimate(es_reference* r)
+{
+    estimate_error(r);
+    estimate_time(r);
+}
+
+es_result es_reference_add(es_reference* r, uint32_t samples)
+{
+    if (!r->begun) return es_misuse(r->context, ES_WRONG_STATE, "es_reference_begin comes before es_reference_add");
+    es_world_revisions now = es_world_get_revisions(r->world);
+    if (now.geometry != r->revisions.geometry || now.materials != r->revisions.materials || now.lights != r->revisions.lights)
+        return es_misuse(r->context, ES_WRONG_STATE, "the world has changed since es_reference_begin; begin again");
+    if (r->stats.done || !samples) return ES_OK;
+    if (r->settings.max_samples && samples > r->settings.max_samples - r->stats.samples) samples = (uint32_t)(r->settings.max_samples - r->stats.samples);
+    if (r->stats.samples + samples > 0xffffffffu) return es_fail(r->context, ES_WRONG_STATE, "2^32 samples per pixel are the most there can be");
+    double start = es_seconds();
+    es_fp_environment environment = es_fp_enter();
+    sample_job job = {r, (uint32_t)r->stats.samples, samples};
+    es_parallel_for(r->context, r->height, 4, sample_rows, &job);
+    r->stats.samples += samples;
+    for (uint32_t y = 0; y < r->height; y++) r->stats.rays += r->row_rays[y];
+    r->stats.seconds += es_seconds() - start;
+    es_reference_estimate(r);
+    es_fp_leave(environment);
+    return ES_OK;
+}
+
+es_reference_stats es_reference_get_stats(const es_reference* r) { return r->stats; }
+
+/* ---- images ------------------------------------------------------------------------------------------------------------------------------- */
+
+es_result es_reference_image(es_reference* r, const char* name, es_image* image)
+{
+    *image = (es_image){0};
+    if (!r->begun || !r->stats.samples) return es_misuse(r->context, ES_WRONG_STATE, "image \"%s\": there are no samples yet", name);
+    char base[64];
+    size_t length = strlen(name);
+    bool error = length > 6 && !strcmp(name + length - 6, "-error");
+    if (error) length -= 6;
+    /* which sums are added, and whose squares the error needs */
+    uint32_t first = 0, last = 0, square = 0;
+    bool known = length < sizeof base;
+    if (known) {
+        memcpy(base, name, length);
+        base[length] = 0;
+        if (!strcmp(base, "radiance")) last = r->bounces + 1, square = r->bounces + 2;
+        else if (!strcmp(base, "emission") && !error) last = 0;
+        else if (!strcmp(base, "direct")) first = last = 1, square = 0;
+        else if (!strcmp(base, "indirect")) first = 2, last = r->bounces + 1, square = r->bounces + 1;
+        else if (!strncmp(base, "bounce-", 7)) {
+            char* end;
+            unsigned long b = strtoul(base + 7, &end, 10);
+            known = base[7] >= '1' && base[7] <= '9' && !*end && b <= r->bounces;
+            first = last = (uint32_t)b + 1;
+            square = (uint32_t)b;
+        } else known = false;
+    }
+    if (!known)
+        return es_fail(r->context, ES_IMAGE_UNKNOWN, "there is no image \"%s\"; radiance, emission, direct, indirect and bounce-1 … bounce-%u are, all but emission also with -error", name,
+            r->bounces);
+    es_result result = es_image_create(r->context, r->width, r->height, 3, image);
+    if (result) return result;
+    es_fp_environment environment = es_fp_enter();
+    for (size_t at = 0; at < value_count(r); at++) {
+        float mean = 0.0f;
+        for (uint32_t i = first; i <= last; i++) mean += es_reference_mean(r, i, at);
+        image->pixels[at] = error ? es_sqrt(variance_of_mean(r, square, at, mean)) : mean;
+    }
+    es_fp_leave(environment);
+    return ES_OK;
+}
