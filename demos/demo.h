@@ -39,6 +39,9 @@ typedef struct demo_options {
     const char* sets[DEMO_MAX_SETS]; /* key=value */
     size_t set_count;
     const char* stats;
+    bool reference; /* the command is `reference`; the texts below are values of its settings, NULL when not given */
+    const char *spp, *seconds, *error, *bounces;
+    const char* resume; /* file */
 } demo_options;
 
 /* Parses what follows the command's name. DEMO_OK, or DEMO_BAD_INPUT after one line on stderr. */
@@ -50,9 +53,9 @@ const char* demo_method_name(uint32_t method);
 
 /* ---- settings (settings.c) --------------------------------------------------------------------------------------- */
 
-/* Applies --size, --gi, --no-skip and every --set to the two structs. */
-int demo_apply_settings(
-    es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer);
+/* Applies --size, --gi, --no-skip and every --set. One of `renderer` and `reference` is NULL: its settings are refused. */
+int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer,
+    es_reference_settings* reference);
 int demo_settings(int count, char** arguments);
 int demo_scenes(int count, char** arguments);
 int demo_images(int count, char** arguments);
@@ -69,6 +72,8 @@ typedef struct demo_session {
 } demo_session;
 
 int demo_session_open(const demo_options* options, demo_session* session);
+/* The context alone. */
+int demo_session_open_context(const demo_options* options, demo_session* session);
 void demo_session_close(demo_session* session);
 /* Brings the world to frame `frame`, which lies at frame / fps seconds: the first call begins at 0. */
 int demo_session_step(demo_session* session, uint32_t frame, double fps);
@@ -111,6 +116,7 @@ double demo_seconds(void);
 /* ---- commands ---------------------------------------------------------------------------------------------------- */
 int demo_render(int count, char** arguments);
 int demo_play(int count, char** arguments);
+int demo_reference(int count, char** arguments);
 int demo_compare(int count, char** arguments);
 int demo_bench(int count, char** arguments);
 

@@ -17,6 +17,13 @@ static const char usage[] =
     "             --image NAME                          which image (default: display)\n"
     "             --hash                                prints `frame N NAME HASH` per frame\n"
     "             --stats FILE.json                     milliseconds and counts per frame and pass\n"
+    "  earthshine reference SCENE|FILE --out FILE.exr   the truth by path tracing; any image format, .exr with all layers\n"
+    "             --spp N --seconds S --error E         when to stop: samples per pixel, time, relRMSE by its own\n"
+    "                                                   estimate; whichever comes first (256 samples when none is given)\n"
+    "             --bounces N                           indirect bounces (1)\n"
+    "             --resume FILE.exr                     goes on where that file stopped\n"
+    "             --image NAME                          radiance, emission, direct, indirect, bounce-N, and -error of each\n"
+    "             --size --frames --fps --threads --isa --set --hash --stats as above\n"
     "  earthshine settings                              list the settings: name, default, range, meaning\n"
     "  earthshine images                                list the images a frame can give\n"
     "  earthshine compare A B [--diff OUT.png] [--max-rmse X] [--max-relrmse X] [--max-relmse X] [--max-max X]\n"
@@ -34,6 +41,7 @@ static const command commands[] = {
     {"scenes", demo_scenes},
     {"play", demo_play},
     {"render", demo_render},
+    {"reference", demo_reference},
     {"settings", demo_settings},
     {"images", demo_images},
     {"compare", demo_compare},

@@ -1,4 +1,4 @@
-/* Arguments of `render` and `play`. Every refusal is one line that says which argument, why, and what would do. */
+/* Arguments of `render`, `play` and `reference`. Every refusal is one line that says which argument, why, and what would do. */
 #include "demo.h"
 
 #include <errno.h>
@@ -86,9 +86,15 @@ static int parse_method(const char* text, demo_options* options)
     return demo_refuse("--gi %s: none, ism or classic is expected", text);
 }
 
-enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, OPTION_COUNT };
-static const char* const option_names[OPTION_COUNT] = {
-    "--out", "--size", "--frames", "--fps", "--threads", "--isa", "--no-skip", "--gi", "--set", "--image", "--hash", "--stats"};
+enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
+static const char* const option_names[OPTION_COUNT] = {"--out", "--size", "--frames", "--fps", "--threads", "--isa", "--no-skip", "--gi", "--set",
+    "--image", "--hash", "--stats", "--spp", "--seconds", "--error", "--bounces", "--resume"};
+
+static bool belongs_to(enum option_id id, bool reference)
+{
+    if (id == NO_SKIP || id == GI) return !reference;
+    return id < SPP || reference;
+}
 
 static int apply_option(enum option_id id, const char* value, demo_options* options)
 {
@@ -120,7 +126,7 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
         options->sets[options->set_count++] = value;
         return DEMO_OK;
     case IMAGE:
-        if (demo_find_image(value) < 0) return DEMO_BAD_INPUT;
+        if (!options->reference && demo_find_image(value) < 0) return DEMO_BAD_INPUT;
         if (options->image_count == DEMO_MAX_IMAGES) return demo_refuse("--image %s: at most %d images", value, DEMO_MAX_IMAGES);
         options->images[options->image_count++] = value;
         return DEMO_OK;
@@ -130,6 +136,21 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
     case STATS:
         options->stats = value;
         return DEMO_OK;
+    case SPP:
+        options->spp = value;
+        return DEMO_OK;
+    case SECONDS:
+        options->seconds = value;
+        return DEMO_OK;
+    case ERROR:
+        options->error = value;
+        return DEMO_OK;
+    case BOUNCES:
+        options->bounces = value;
+        return DEMO_OK;
+    case RESUME:
+        options->resume = value;
+        return DEMO_OK;
     case OPTION_COUNT:
         break;
     }
@@ -138,7 +159,7 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
 
 int demo_parse_options(const char* command, int count, char** arguments, demo_options* options)
 {
-    *options = (demo_options){.end = 1, .fps = 30, .method = -1};
+    *options = (demo_options){.end = 1, .fps = 30, .method = -1, .reference = !strcmp(command, "reference")};
     bool only_names = false;
     for (int i = 0; i < count; i++) {
         const char* argument = arguments[i];
@@ -163,6 +184,8 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
             return demo_refuse("%s: unknown option %s; %s%s%s", command, argument,
                 nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "", nearest ? "?" : "");
         }
+        if (!belongs_to((enum option_id)id, options->reference))
+            return demo_refuse("%s: %s is an option of %s", command, option_names[id], options->reference ? "render and play" : "reference");
         bool takes_value = id != NO_SKIP && id != HASH;
         if (!takes_value && equals) return demo_refuse("%s: takes no value", option_names[id]);
         const char* value = equals ? equals + 1 : NULL;

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-int demo_session_open(const demo_options* options, demo_session* session)
+int demo_session_open_context(const demo_options* options, demo_session* session)
 {
     *session = (demo_session){0};
     es_context_desc desc = es_default_context_desc();
@@ -11,9 +11,15 @@ int demo_session_open(const demo_options* options, demo_session* session)
     desc.threads = options->threads;
     desc.isa_mask = options->isa_mask;
     es_result result = es_context_create(&desc, &session->context);
-    if (result != ES_OK) return demo_refuse("%s", es_result_text(result));
+    return result == ES_OK ? DEMO_OK : demo_refuse("%s", es_result_text(result));
+}
+
+int demo_session_open(const demo_options* options, demo_session* session)
+{
+    int code = demo_session_open_context(options, session);
+    if (code != DEMO_OK) return code;
     es_world_settings world_settings;
-    int code = demo_apply_settings(session->context, options, &world_settings, &session->settings);
+    code = demo_apply_settings(session->context, options, &world_settings, &session->settings, NULL);
     if (code == DEMO_OK && es_world_open(session->context, options->scene, &world_settings, &session->world) != ES_OK)
         code = demo_refuse_context(session->context);
     if (code == DEMO_OK && es_renderer_create(session->context, &session->settings, &session->renderer) != ES_OK)

@@ -1,4 +1,4 @@
-/* What can be named on the command line, listed: settings of world and renderer, scenes, images; and settings applied. */
+/* What can be named on the command line, listed: settings of world, renderer and reference, scenes, images; and settings applied. */
 #include "demo.h"
 
 #include <string.h>
@@ -17,6 +17,13 @@ static bool renderer_has(const char* name)
     return false;
 }
 
+static bool reference_has(const char* name)
+{
+    for (size_t i = 0; i < es_reference_setting_count(); i++)
+        if (!strcmp(es_reference_setting(i)->name, name)) return true;
+    return false;
+}
+
 static int refuse_unknown(const char* name)
 {
     enum { MOST = 256 };
@@ -24,39 +31,63 @@ static int refuse_unknown(const char* name)
     size_t count = 0;
     for (size_t i = 0; i < es_world_setting_count() && count < MOST; i++) names[count++] = es_world_setting(i)->name;
     for (size_t i = 0; i < es_renderer_setting_count() && count < MOST; i++) names[count++] = es_renderer_setting(i)->name;
+    for (size_t i = 0; i < es_reference_setting_count() && count < MOST; i++) names[count++] = es_reference_setting(i)->name;
     const char* nearest = demo_nearest(name, names, count);
     if (nearest) return demo_refuse("--set %s: no such setting; did you mean %s?", name, nearest);
     return demo_refuse("--set %s: no such setting; `earthshine settings` lists all", name);
 }
 
-int demo_apply_settings(
-    es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer)
+static int apply_sets(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer,
+    es_reference_settings* reference)
 {
-    *world = es_default_world_settings();
-    *renderer = es_default_renderer_settings();
-    if (options->size_given) {
-        renderer->width = options->width;
-        renderer->height = options->height;
-    }
-    if (options->method >= 0) renderer->method = (uint32_t)options->method;
-    if (options->no_skip) renderer->skip = false;
     for (size_t i = 0; i < options->set_count; i++) {
         char name[128];
         const char* equals = strchr(options->sets[i], '=');
         snprintf(name, sizeof name, "%.*s", (int)(equals - options->sets[i]), options->sets[i]);
         es_result result;
-        if (renderer_has(name))
-            result = es_renderer_settings_set(context, renderer, name, equals + 1);
-        else if (world_has(name))
+        if (world_has(name)) {
             result = es_world_settings_set(context, world, name, equals + 1);
-        else
+        } else if (renderer_has(name)) {
+            if (!renderer) return demo_refuse("--set %s: is a setting of render and play, not of reference", name);
+            result = es_renderer_settings_set(context, renderer, name, equals + 1);
+        } else if (reference_has(name)) {
+            if (!reference) return demo_refuse("--set %s: is a setting of reference, not of render and play", name);
+            result = es_reference_settings_set(context, reference, name, equals + 1);
+        } else {
             return refuse_unknown(name);
+        }
         if (result != ES_OK) return demo_refuse_context(context);
     }
-    if (renderer->width < 1 || renderer->height < 1 || renderer->width > ES_RASTER_MAX_SIZE ||
-        renderer->height > ES_RASTER_MAX_SIZE)
-        return demo_refuse("an image of %ux%u: from 1x1 to %dx%d is accepted", renderer->width, renderer->height,
-            ES_RASTER_MAX_SIZE, ES_RASTER_MAX_SIZE);
+    return DEMO_OK;
+}
+
+static int apply_reference_options(es_context* context, const demo_options* options, es_reference_settings* reference)
+{
+    const char* const texts[][2] = {{"reference.samples", options->spp}, {"reference.seconds", options->seconds},
+        {"reference.error", options->error}, {"reference.bounces", options->bounces}};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
+        if (texts[i][1] && es_reference_settings_set(context, reference, texts[i][0], texts[i][1]) != ES_OK) return demo_refuse_context(context);
+    return DEMO_OK;
+}
+
+int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer,
+    es_reference_settings* reference)
+{
+    *world = es_default_world_settings();
+    if (renderer) {
+        *renderer = es_default_renderer_settings();
+        if (options->method >= 0) renderer->method = (uint32_t)options->method;
+        if (options->no_skip) renderer->skip = false;
+    }
+    if (reference) {
+        *reference = es_default_reference_settings();
+        if (apply_reference_options(context, options, reference) != DEMO_OK) return DEMO_BAD_INPUT;
+    }
+    uint32_t *width = renderer ? &renderer->width : &reference->width, *height = renderer ? &renderer->height : &reference->height;
+    if (options->size_given) *width = options->width, *height = options->height;
+    if (apply_sets(context, options, world, renderer, reference) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (*width < 1 || *height < 1 || *width > ES_RASTER_MAX_SIZE || *height > ES_RASTER_MAX_SIZE)
+        return demo_refuse("an image of %ux%u: from 1x1 to %dx%d is accepted", *width, *height, ES_RASTER_MAX_SIZE, ES_RASTER_MAX_SIZE);
     return DEMO_OK;
 }
 
@@ -90,6 +121,7 @@ int demo_settings(int count, char** arguments)
     if (expect_nothing("settings", count, arguments) != DEMO_OK) return DEMO_BAD_INPUT;
     for (size_t i = 0; i < es_world_setting_count(); i++) print_setting(es_world_setting(i));
     for (size_t i = 0; i < es_renderer_setting_count(); i++) print_setting(es_renderer_setting(i));
+    for (size_t i = 0; i < es_reference_setting_count(); i++) print_setting(es_reference_setting(i));
     return DEMO_OK;
 }
 

@@ -163,6 +163,7 @@ ES_API es_reference_stats es_reference_get_stats(const es_reference* reference);
 /* "radiance" (everything), "emission" (seen directly), "direct", "indirect" (the sum of all bounces), "bounce-1" … "bounce-64", and with
  * "-error" appended the standard error of each, per pixel and channel. The caller destroys the image. */
 ES_API es_result es_reference_image(es_reference* reference, const char* name, es_image* image);
+ES_API bool es_reference_has_image(uint32_t bounces, const char* name);
 /* Writes an EXR whose R, G, B are the radiance; further channels hold the other images and the accumulators. */
 ES_API es_result es_reference_save(es_reference* reference, const char* path);
 /* After es_reference_begin: goes on where the file stopped. FILE_UNSUPPORTED when it was made from another world, camera or settings. */

@@ -1,7 +1,6 @@
 /* The reference's life: settings, the film, adding samples, images of what has been summed. */
 #include "gi/reference/reference.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "platform/context.h"
@@ -194,7 +193,7 @@ float es_reference_mean(const es_reference* r, uint32_t image, size_t at)
 }
 
 /* Variance of the mean from that of single samples. Stratified samples do better than independent ones, so this errs on the safe side. */
-static float variance_of_mean(const es_reference* r, uint32_t square, size_t at, float mean)
+float es_reference_variance(const es_reference* r, uint32_t square, size_t at, float mean)
 {
     double n = (double)r->stats.samples;
     if (n < 2) return __builtin_inff();
@@ -218,7 +217,7 @@ static void estimate_error(es_reference* r)
     double variance = 0.0, mean = 0.0;
     for (size_t at = 0; at < value_count(r); at++) {
         float m = radiance_mean(r, at, 0);
-        variance += variance_of_mean(r, r->bounces + 2, at, m);
+        variance += es_reference_variance(r, r->bounces + 2, at, m);
         mean += m;
     }
     double n = (double)value_count(r);
@@ -269,46 +268,3 @@ es_result es_reference_add(es_reference* r, uint32_t samples)
 }
 
 es_reference_stats es_reference_get_stats(const es_reference* r) { return r->stats; }
-
-/* ---- images ------------------------------------------------------------------------------------------------------------------------------- */
-
-es_result es_reference_image(es_reference* r, const char* name, es_image* image)
-{
-    *image = (es_image){0};
-    if (!r->begun || !r->stats.samples) return es_misuse(r->context, ES_WRONG_STATE, "image \"%s\": there are no samples yet", name);
-    char base[64];
-    size_t length = strlen(name);
-    bool error = length > 6 && !strcmp(name + length - 6, "-error");
-    if (error) length -= 6;
-    /* which sums are added, and whose squares the error needs */
-    uint32_t first = 0, last = 0, square = 0;
-    bool known = length < sizeof base;
-    if (known) {
-        memcpy(base, name, length);
-        base[length] = 0;
-        if (!strcmp(base, "radiance")) last = r->bounces + 1, square = r->bounces + 2;
-        else if (!strcmp(base, "emission") && !error) last = 0;
-        else if (!strcmp(base, "direct")) first = last = 1, square = 0;
-        else if (!strcmp(base, "indirect")) first = 2, last = r->bounces + 1, square = r->bounces + 1;
-        else if (!strncmp(base, "bounce-", 7)) {
-            char* end;
-            unsigned long b = strtoul(base + 7, &end, 10);
-            known = base[7] >= '1' && base[7] <= '9' && !*end && b <= r->bounces;
-            first = last = (uint32_t)b + 1;
-            square = (uint32_t)b;
-        } else known = false;
-    }
-    if (!known)
-        return es_fail(r->context, ES_IMAGE_UNKNOWN, "there is no image \"%s\"; radiance, emission, direct, indirect and bounce-1 … bounce-%u are, all but emission also with -error", name,
-            r->bounces);
-    es_result result = es_image_create(r->context, r->width, r->height, 3, image);
-    if (result) return result;
-    es_fp_environment environment = es_fp_enter();
-    for (size_t at = 0; at < value_count(r); at++) {
-        float mean = 0.0f;
-        for (uint32_t i = first; i <= last; i++) mean += es_reference_mean(r, i, at);
-        image->pixels[at] = error ? es_sqrt(variance_of_mean(r, square, at, mean)) : mean;
-    }
-    es_fp_leave(environment);
-    return ES_OK;
-}

@@ -31,6 +31,8 @@ uint32_t es_reference_image_count(const es_reference* reference);   /* of sums *
 uint32_t es_reference_square_count(const es_reference* reference);
 /* Mean of an image at a value (pixel × 3 + channel). */
 float es_reference_mean(const es_reference* reference, uint32_t image, size_t at);
+/* Variance of that mean; infinite before the second sample. */
+float es_reference_variance(const es_reference* reference, uint32_t square, size_t at, float mean);
 /* As after es_reference_begin: no samples. */
 void es_reference_forget(es_reference* reference);
 /* Error, time left and whether a limit is reached, into the stats. */
