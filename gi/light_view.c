@@ -16,7 +16,7 @@ float es_light_falloff(const es_light_state* light, es_vec3 towards_point, float
         factor = t * t;
     }
     if (light->type != ES_LIGHT_DIRECTIONAL && light->range > 0.0f) {
-        float q = distance / light->range, q2 = q * q;
+        float q = es_minf(distance / light->range, 2.0f), q2 = q * q;
         factor *= es_clampf(1.0f - q2 * q2, 0.0f, 1.0f);
     }
     return factor;

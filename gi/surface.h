@@ -68,8 +68,8 @@ static inline void es_surface_parts(const es_surface* s, es_vec3 n, es_vec3 wi, 
     *pass = 0.0f;
     *lobe = es_v3(0, 0, 0);
     if (!(nl > 0.0f && nv > 0.0f)) return;
-    nl = es_minf(nl, 1.0f);
-    nv = es_minf(nv, 1.0f);
+    nl = es_clampf(nl, 1e-20f, 1.0f);
+    nv = es_clampf(nv, 1e-20f, 1.0f);
     if (s->model == ES_SURFACE_PHONG) {
         float r = es_minf(es_maxf(2.0f * nl * nv - c, 0.0f), 1.0f);
         *pass = 1.0f;

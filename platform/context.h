@@ -36,9 +36,12 @@ typedef void (*es_loop_body)(void* user, uint32_t begin, uint32_t end, uint32_t 
 void es_parallel_for(es_context* context, uint32_t count, uint32_t grain, es_loop_body body, void* user);
 uint32_t es_context_workers(const es_context* context);
 
-/* Round to nearest, no flush to zero, no traps: on entry to every public call that computes; the caller's is put back. */
+/* Round to nearest, no flush to zero, no traps: on entry to every public call that computes; the caller's is put back. A build with
+ * EARTHSHINE_TRAP_FP traps what makes a NaN or an infinity. */
 typedef struct es_fp_environment { uint64_t saved; } es_fp_environment;
 es_fp_environment es_fp_enter(void);
+/* Never with traps: for numbers of files and pictures, which may be anything, and for libraries that read them. */
+es_fp_environment es_fp_enter_untrapped(void);
 void es_fp_leave(es_fp_environment environment);
 
 /* Counts objects created from the context so that leaks are reported at its end: +1 and -1. */

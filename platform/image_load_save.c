@@ -61,7 +61,7 @@ es_result es_image_load_memory(es_context* context, const void* bytes, size_t si
     if (!image || (!bytes && size)) return es_misuse(context, ES_INVALID_ARGUMENT, "es_image_load_memory: bytes and image must not be NULL");
     *image = (es_image){0};
     es_image_source source = {bytes, size, label && label[0] ? label : "memory"};
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped();
     es_result result = read_source(context, &source, image);
     es_fp_leave(environment);
     return result;
@@ -170,7 +170,7 @@ static es_result write_file(es_context* context, const es_image* image, const ch
         unlink(temporary);
         return es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", path, system_reason(error));
     }
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped();
     es_result result = writer(context, image, desc, path, &sink);
     es_fp_leave(environment);
     errno = 0;

@@ -104,6 +104,7 @@ M_DECLARE M_F M_NAME(log2)(M_F x)
  * results below 2^-20 vanish in a sum; a log2 in two floats would double the cost. */
 M_DECLARE M_F M_NAME(pow)(M_F x, M_F y)
 {
-    M_F result = M_NAME(exp2)(y * M_NAME(log2)(x));
-    return M_SELECT((y == 0.0f) | (x == 1.0f), M_SET(1.0f), result);
+    M_MASK one = (y == 0.0f) | (x == 1.0f); /* their product would be 0 times infinity */
+    M_F result = M_NAME(exp2)(M_SELECT(one, M_SET(1.0f), y) * M_NAME(log2)(x));
+    return M_SELECT(one, M_SET(1.0f), result);
 }

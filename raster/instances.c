@@ -84,6 +84,8 @@ es_view_matrices es_view_matrices_of(const es_raster_view* view)
 static bool outside(const double window[16], const es_raster_mesh* mesh, uint32_t width, uint32_t height)
 {
     const float low[3] = {mesh->bounds_min.x, mesh->bounds_min.y, mesh->bounds_min.z}, high[3] = {mesh->bounds_max.x, mesh->bounds_max.y, mesh->bounds_max.z};
+    for (int i = 0; i < 3; i++)
+        if (!__builtin_isfinite(low[i]) || !__builtin_isfinite(high[i])) return false;
     unsigned all = ~0u;
     double hw = 0.5 * width + 1, hh = 0.5 * height + 1;
     for (int corner = 0; corner < 8; corner++) {

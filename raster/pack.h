@@ -14,10 +14,10 @@
 
 /* ---- eight at a time ------------------------------------------------------------------------------------------------- */
 
-/* Any length with a finite, non-zero sum of magnitudes. */
+/* Any length with a finite sum of magnitudes of 1e-30 or more; below, some direction. */
 VINL vi es_pack_normal_v(vf x, vf y, vf z)
 {
-    vf s = vf_set1(32767.0f) / (vf_abs(x) + vf_abs(y) + vf_abs(z));
+    vf s = vf_set1(32767.0f) / vf_max(vf_abs(x) + vf_abs(y) + vf_abs(z), vf_set1(1e-30f));
     vf px = x * s, py = y * s;
     vf one = vf_set1(32767.0f);
     vm below = vm_lt(z, vf_zero());

@@ -50,6 +50,8 @@ es_result es_rasterizer_create(es_context* context, es_rasterizer** rasterizer)
         es_rasterizer_destroy(r);
         return es_context_last_result(context);
     }
+    /* the record of pixels that see nothing: at a distance that can be divided by */
+    for (uint32_t i = 0; i < r->worker_count; i++) r->workers[i].visible[0].distance_low = r->workers[i].visible[0].distance_high = 1.0f;
     *rasterizer = r;
     return ES_OK;
 }

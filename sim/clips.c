@@ -144,7 +144,7 @@ void es_clips_play(es_world* world)
         const es_clip_object* clip = es_slots_at(slots, slot);
         if (!clip || !clip->playing) continue;
         double t = world->time - clip->start, duration = clip->duration;
-        if (duration > 0) {
+        if (duration > __builtin_fabs(t) * 0x1p-52) { /* shorter ones have no phase that a double could hold */
             t -= duration * (double)(int64_t)(t / duration);
             if (t < 0) t += duration;
             if (t >= duration) t = 0;

@@ -61,7 +61,7 @@ template <class T> using list = std::vector<T, counted<T>>;
 
 /* The caller's floating-point environment comes back on every way out. */
 struct fp_scope {
-    es_fp_environment saved = es_fp_enter();
+    es_fp_environment saved = es_fp_enter_untrapped();
     ~fp_scope() { es_fp_leave(saved); }
 };
 

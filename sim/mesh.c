@@ -172,8 +172,8 @@ es_result es_world_add_mesh(es_world* world, const es_mesh_desc* desc, es_mesh* 
     if (!world) return ES_INVALID_ARGUMENT;
     if (!desc || !mesh) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_add_mesh: desc and mesh must not be NULL");
     *mesh = (es_mesh){0};
-    es_fp_environment environment = es_fp_enter();
     es_result result = check_desc(world, desc);
+    es_fp_environment environment = es_fp_enter();
     if (result == ES_OK) {
         es_mesh_object* object = es_slots_add(world->context, &world->slots[ES_OBJECT_MESH], "mesh", desc->name);
         if (object && fill(world, object, desc)) {

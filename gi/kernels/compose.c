@@ -24,7 +24,8 @@ static inline rgb_v pbr_neutral(rgb_v c)
 {
     const vf start = vf_set1(0.8f - 0.04f), rest = vf_set1(1.0f - (0.8f - 0.04f));
     vf low = vf_min(c.r, vf_min(c.g, c.b));
-    vf offset = vf_select(vm_lt(low, vf_set1(0.08f)), low - vf_set1(6.25f) * low * low, vf_set1(0.04f));
+    vf small = vf_min(low, vf_set1(0.08f)); /* the square of what is bright leaves the range of floats */
+    vf offset = vf_select(vm_lt(low, vf_set1(0.08f)), small - vf_set1(6.25f) * small * small, vf_set1(0.04f));
     c = (rgb_v){c.r - offset, c.g - offset, c.b - offset};
     vf peak = vf_max(c.r, vf_max(c.g, c.b));
     vm compress = vm_ge(peak, start);

@@ -119,7 +119,7 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                         strength = strength * t * t;
                     }
                     if (light->range > 0.0f) {
-                        vf q = d * vf_set1(1.0f / light->range), q2 = q * q;
+                        vf q = vf_min(d * vf_set1(1.0f / light->range), vf_set1(2.0f)), q2 = q * q;
                         strength = strength * vf_min(vf_max(one - q2 * q2, zero), one);
                     }
                 }

@@ -12,6 +12,9 @@
 #include "raster/pack.h"
 #include "raster/points.h"
 
+/* m²: the square of what is closer would leave the range of floats */
+#define NEAREST2 0x1p-62f
+
 typedef struct lanes_of_phase { uint32_t x0, columns, lanes, y0, rows; } lanes_of_phase; /* lanes: columns rounded up to VW */
 
 static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool with_lobes, bool* any_lobe)
@@ -55,7 +58,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             if (!with_lobes) continue;
             vf v[3];
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
-            vf s = vf_set1(1.0f) / vf_sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+            vf s = vf_set1(1.0f) / vf_sqrt(vf_max(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], vf_set1(1e-30f))); /* unseen pixels lie in the eye */
             for (int k = 0; k < 3; k++) v[k] = v[k] * s;
             es_lift_to_horizon_v(nx, ny, nz, &v[0], &v[1], &v[2]);
             vf_store(batch->vx + at, vf_and(seen, v[0]));
@@ -99,18 +102,17 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
         vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i); /* times -r */
         vm lit = vm_gt(qz, zero) & vm_lt(pixel_cos, zero);
         if (!vm_any(lit)) continue;
-        vf r2 = dx * dx + dy * dy + dz * dz;
+        vf r2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(NEAREST2));
         vf r = vf_sqrt(r2);
         if (shadowed) {
             vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz;
-            /* lit lanes have r + qz > 0 and |u|, |v| <= 1 up to rounding; the others read the middle of the map */
-            vf s = vf_and(lit, half / (r + qz));
+            /* |u|, |v| <= 1 up to rounding; what lies behind the light reads a texel of this side */
+            vf s = half / (r + vf_max(qz, zero));
             vi x = vi_truncate(vf_max(vf_min(qx * s + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * s + half, last), zero));
             vf depth = vf_from_int(vi_gather16(map, y * size + x));
             /* r - bias - slope_bias / cos <= depth, times r cos */
             lit &= vm_le((r * depth_scale - bias) * vf_neg(pixel_cos) - slope_bias * r, depth * vf_neg(pixel_cos));
         }
-        /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
         vf g = vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + spread)), bound));
         /* without F0 a lobe is 0 and lets everything pass: the same bits for less */
         const bool lobed = lobes && batch->lobed[i / VW];
@@ -121,7 +123,7 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
             continue;
         }
         if (!vm_any(lit)) continue;
-        vf inverse = one / vf_max(r, vf_set1(1e-18f));
+        vf inverse = one / r;
         vf wx = dx * inverse, wy = dy * inverse, wz = dz * inverse;
         vf sent[3] = {red, green, blue};
         if (glossy_light) {
@@ -185,14 +187,13 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
             vf qz = dx * nx + dy * ny + dz * nz;
             vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i);
             vm lit = vm_gt(qz, zero) & vm_lt(pixel_cos, zero);
-            vf r2 = dx * dx + dy * dy + dz * dz;
-            /* 0 / 0 for a pair closer than the square root of the smallest float: the minimum of NaN and the bound is the bound */
+            vf r2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(NEAREST2));
             vf_store(geometry + k * VW, vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + spread)), bound)));
             if (!shadowed) continue;
             vf r = vf_sqrt(r2);
             vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz;
-            /* lit lanes have r + qz > 0 and |u|, |v| <= 1 up to rounding; the others read the middle of the map */
-            vf s = vf_and(lit, half / (r + qz));
+            /* |u|, |v| <= 1 up to rounding; what lies behind the light reads a texel of this side */
+            vf s = half / (r + vf_max(qz, zero));
             vi x = vi_truncate(vf_max(vf_min(qx * s + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * s + half, last), zero));
             vi_store(place + k * VW, y * size + x);
             /* r - bias - slope_bias / cos <= depth, times r cos, which is what pixel_cos holds with its sign turned */

@@ -35,8 +35,9 @@ VINL void es_surface_parts_v(const es_surface_v* s, vf nx, vf ny, vf nz, vf ix, 
     const vf zero = vf_zero(), one = vf_set1(1.0f);
     vf nl = nx * ix + ny * iy + nz * iz, nv = nx * ox + ny * oy + nz * oz, c = ix * ox + iy * oy + iz * oz;
     vm above = vm_gt(nl, zero) & vm_gt(nv, zero);
-    nl = vf_min(nl, one);
-    nv = vf_min(nv, one);
+    /* positive in lanes below the surface as well: what follows divides by them */
+    nl = vf_clamp(nl, vf_set1(1e-20f), one);
+    nv = vf_clamp(nv, vf_set1(1e-20f), one);
     vf f90 = vf_min(vf_set1(25.0f) * vf_max(s->specular[0], vf_max(s->specular[1], s->specular[2])), one);
     vf a = one - nl, b = one - nv;
     vf a2 = a * a, b2 = b * b;

@@ -416,6 +416,7 @@ static void set_up_visible(const es_resolve_job* job, uint32_t which, vm mask, v
     for (int i = 0; i < 32; i++) words[i] = vf_zero();
     words[7] = vf_from_bits(vi_set1((int32_t)tag));
     if (complex) {
+        words[4] = words[5] = vf_set1(1.0f); /* a distance to divide by until the pixel has its own */
         store_visible(records, mask, words);
         return;
     }

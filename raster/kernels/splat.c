@@ -77,12 +77,12 @@ void ES_KERNEL(es_splat_parabolic_map)(const es_parabolic_map* map, const es_poi
             vm drawn = vm_gt(qz, vf_zero()) & vm_ge(r2, near2) & vm_lt(r2, far2);
             if (points->count - i < VW) drawn &= vm_first((int32_t)(points->count - i));
             vf r = vf_sqrt(r2);
-            vf s = vf_set1(1.0f) / (r + qz);
+            vf s = vf_set1(1.0f) / vf_select(drawn, r + qz, vf_set1(map->far_distance));
             vi width = vi_round(vf_clamp(width_scale * s, vf_set1(1.0f), vf_set1(4.0f)));
             vf w = vf_from_int(width);
             vf first = corner - vf_set1(0.5f) * w, last = side - w;
             s = s * centre;
-            /* max first: NaN in lanes that are not drawn becomes 0, so every lane has a place in the map */
+            /* every lane has a place in the map, those that are not drawn too */
             vi x = vi_truncate(vf_min(vf_max(qx * s + first, vf_zero()), last));
             vi y = vi_truncate(vf_min(vf_max(qy * s + first, vf_zero()), last));
             vi at = (y * side_int + x) | ((width - vi_set1(1)) << 20);
