@@ -1014,7 +1014,7 @@ static void test_images(void** state)
     log_record log;
     es_context* context = new_context((es_context_desc){.threads = 1, .memory_cap = 1 << 20}, &log);
     es_image image, other;
-    const uint32_t bad[][3] = {{0, 1, 1}, {1, 0, 1}, {16385, 1, 1}, {1, UINT32_MAX, 1}, {1, 1, 0}, {1, 1, 65}};
+    const uint32_t bad[][3] = {{0, 1, 1}, {1, 0, 1}, {16385, 1, 1}, {1, UINT32_MAX, 1}, {1, 1, 0}, {1, 1, ES_IMAGE_MAX_CHANNELS + 1}};
     for (int i = 0; i < 6; i++) {
         assert_int_equal(es_image_create(context, bad[i][0], bad[i][1], bad[i][2], &image), ES_IMAGE_SIZE);
         assert_null(image.pixels);
