@@ -172,7 +172,7 @@ ES_API es_result es_reference_resume(es_reference* reference, const char* path);
 /* ---- error: how far a picture is from the truth ------------------------------------------------------------------------------------ */
 
 /* Of a picture A against a reference B, over all pixels and the channels compared, with d = A - B. Deterministic: own elementary
- * functions, sums in double in pixel order. A pair that is not finite counts as infinite error unless both are the same. */
+ * functions, compensated sums in double in pixel order. A pair that is not finite counts as infinite error unless both are the same. */
 typedef struct es_image_error {
     double rmse;              /* sqrt(mean(d²)) */
     double relrmse;           /* rmse / mean(B) */
@@ -181,7 +181,7 @@ typedef struct es_image_error {
     double flip;              /* mean ꟻLIP 0 … 1 (Andersson et al. 2020), after the tone map of the display; NaN with fewer than three channels */
     double hdr_flip;          /* mean HDR-ꟻLIP (Andersson et al. 2021), over the exposures it chooses; NaN likewise */
     double max;               /* largest |d| */
-    double mean, reference_mean;
+    double mean, reference_mean; /* of the finite values */
     uint64_t samples;         /* compared values */
 } es_image_error;
 
@@ -197,10 +197,12 @@ typedef struct es_error_desc {
 ES_API es_result es_image_compare(es_context* context, const es_image* a, const es_image* b, const es_error_desc* desc, es_image_error* error);
 
 typedef enum es_error_map { ES_ERROR_MAP_ABSOLUTE, ES_ERROR_MAP_RELATIVE, ES_ERROR_MAP_SIGNED, ES_ERROR_MAP_FLIP, ES_ERROR_MAP_HDR_FLIP } es_error_map;
-/* The error of each pixel as one channel (SIGNED: mean of d over channels; others: >= 0). The caller destroys it. */
+/* The error of each pixel as one channel whose mean is the measure; pixels the mask leaves out are 0. ABSOLUTE: mean of |d| over channels,
+ * RELATIVE: of d² / (B² + 0.01), SIGNED: of d. desc NULL: no mask. The caller destroys it. INVALID_ARGUMENT as es_image_compare. */
 ES_API es_result es_image_error_map(es_context* context, const es_image* a, const es_image* b, es_error_map map, const es_error_desc* desc, es_image* result);
-/* One channel to false colour, sRGB samples: 0 … scale from black over blue, red and yellow to white, lightness rising all the way;
- * SIGNED maps from blue (-scale) over black to red-yellow (+scale). */
+/* One channel to false colour, sRGB samples (save them with es_image_save_desc.already_srgb): 0 … scale by the map "magma", from black over
+ * purple, red and orange to pale yellow, lightness rising evenly; is_signed: from light blue (-scale) over black to yellow (+scale), equally
+ * light on both sides. NaN is green. */
 ES_API es_result es_image_false_colour(es_context* context, const es_image* values, float scale, bool is_signed, es_image* result);
 
 /* Flicker of a sequence: the error of the change from frame to frame. With dA = A(t) - A(t-1), dB likewise:
