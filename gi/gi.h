@@ -111,9 +111,9 @@ typedef struct es_vpl {
     es_vec3 position, normal;
     float flux[3];            /* radiant exitance × area share: intensity along the normal is flux / pi, W/sr */
 } es_vpl;
-/* Virtual point lights of the last frame, for overlays. */
+/* Virtual point lights of the last frame, relative to es_world_origin, for overlays. */
 ES_API size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t capacity);
-/* World positions of the points one imperfect shadow map is drawn from, 3 floats each. */
+/* Positions, relative to es_world_origin, of the points one imperfect shadow map is drawn from, 3 floats each. */
 ES_API size_t es_renderer_points(const es_renderer* renderer, uint32_t map, float* positions, size_t capacity);
 
 /* ---- reference: a progressive path tracer over the same world ------------------------------------------------------------------- */

@@ -111,9 +111,19 @@ es_result es_world_set_active_camera(es_world* world, es_camera camera)
     return ES_OK;
 }
 
-static es_camera_state state_of(uint32_t id, const es_camera_desc* desc, const es_mat4* to_world)
+static es_camera_state state_of(uint32_t id, const es_camera_desc* desc, es_mat4 pose)
 {
-    return (es_camera_state){id, desc->orthographic, desc->fov_y, desc->half_height, desc->near_plane, desc->far_plane, *to_world};
+    return (es_camera_state){id, desc->orthographic, desc->fov_y, desc->half_height, desc->near_plane, desc->far_plane, pose};
+}
+
+static es_mat4 pose_of(const es_world* world, const es_camera_object* camera)
+{
+    return es_relative_matrix(world, es_node_world(world, camera->desc.node), es_node_position(world, camera->desc.node));
+}
+
+static es_mat4 previous_pose_of(const es_world* world, const es_camera_object* camera)
+{
+    return es_relative_matrix(world, &camera->previous_world, camera->previous_position);
 }
 
 void es_camera_refresh(es_world* world)
@@ -126,6 +136,7 @@ void es_camera_refresh(es_world* world)
         if (!object || !(object->fresh || !world->stepped)) continue;
         object->previous = object->desc;
         object->previous_world = *es_node_world(world, object->desc.node);
+        memcpy(object->previous_position, es_node_position(world, object->desc.node), sizeof object->previous_position);
         object->fresh = false;
     }
     es_camera_state now, last;
@@ -133,8 +144,8 @@ void es_camera_refresh(es_world* world)
     last = now;
     const es_camera_object* active = es_slots_get(slots, world->active_camera.id);
     if (active) {
-        now = state_of(active->object.id, &active->desc, es_node_world(world, active->desc.node));
-        last = state_of(active->object.id, &active->previous, &active->previous_world);
+        now = state_of(active->object.id, &active->desc, pose_of(world, active));
+        last = state_of(active->object.id, &active->previous, previous_pose_of(world, active));
     }
     if (memcmp(&now, &world->camera_state, sizeof now) != 0) world->revisions.camera++;
     world->camera_state = now;
@@ -164,8 +175,9 @@ es_result es_world_camera_view(const es_world* world, es_camera camera, uint32_t
     es_fp_environment environment = es_fp_enter();
     float aspect = (float)width / (float)height;
     *view = (es_raster_view){.width = width, .height = height, .cull = ES_CULL_BACK};
-    matrices(&object->desc, es_node_world(world, object->desc.node), aspect, &view->view, &view->projection);
-    matrices(&object->previous, &object->previous_world, aspect, &view->previous_view, &view->previous_projection);
+    es_mat4 now = pose_of(world, object), last = previous_pose_of(world, object);
+    matrices(&object->desc, &now, aspect, &view->view, &view->projection);
+    matrices(&object->previous, &last, aspect, &view->previous_view, &view->previous_projection);
     es_fp_leave(environment);
     return ES_OK;
 }

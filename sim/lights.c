@@ -103,7 +103,8 @@ static bool state_of(const es_world* world, const es_light_object* object, es_li
     const float* m = es_node_world(world, desc->node)->m;
     if (desc->off || !es_all_within(m, 16, ES_WORLD_EXTENT)) return false;
     *state = (es_light_state){.handle = {object->object.id}, .type = desc->type, .range = desc->range};
-    state->position = es_v3(m[12], m[13], m[14]);
+    es_mat4 pose = es_relative_matrix(world, es_node_world(world, desc->node), es_node_position(world, desc->node));
+    state->position = es_v3(pose.m[12], pose.m[13], pose.m[14]);
     state->direction = es_v3_normalize(es_v3(-m[8], -m[9], -m[10]), es_v3(0, 0, -1));
     float strongest = 0;
     for (int c = 0; c < 3; c++) {

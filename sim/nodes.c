@@ -132,6 +132,35 @@ const es_mat4* es_node_previous(const es_world* world, es_node node)
     return object ? &object->previous : &identity;
 }
 
+static const double nowhere[3] = {0, 0, 0};
+
+const double* es_node_position(const es_world* world, es_node node)
+{
+    const es_node_object* object = es_slots_get(&world->slots[ES_OBJECT_NODE], node.id);
+    return object ? object->position : nowhere;
+}
+
+const double* es_node_previous_position(const es_world* world, es_node node)
+{
+    const es_node_object* object = es_slots_get(&world->slots[ES_OBJECT_NODE], node.id);
+    return object ? object->previous_position : nowhere;
+}
+
+/* The translation is summed in double: far from the world's zero, floats cannot say where a node is within a scene. */
+static void place(es_node_object* node, const es_node_object* parent)
+{
+    node->world = parent ? es_mat4_mul(parent->world, node->local) : node->local;
+    for (int row = 0; row < 3; row++) {
+        double sum = node->local.m[12 + row];
+        if (parent) {
+            sum = parent->position[row];
+            for (int k = 0; k < 3; k++) sum += (double)parent->world.m[4 * k + row] * (double)node->local.m[12 + k];
+        }
+        node->position[row] = sum;
+        node->world.m[12 + row] = (float)sum;
+    }
+}
+
 /* Slots sorted by depth, in slot order within a depth: one pass per depth until all are placed. Trees are shallow, and a
  * chain of n nodes costs n passes only when the tree itself changes; deep chains go through the counting branch instead. */
 static void rebuild_order(es_world* world)
@@ -176,6 +205,12 @@ static void rebuild_order(es_world* world)
     world->order_dirty = false;
 }
 
+void es_node_settle(es_node_object* node)
+{
+    node->previous = node->world;
+    memcpy(node->previous_position, node->position, sizeof node->position);
+}
+
 void es_nodes_refresh(es_world* world)
 {
     const es_slots* slots = &world->slots[ES_OBJECT_NODE];
@@ -190,12 +225,14 @@ void es_nodes_refresh(es_world* world)
         if (node->dirty || (parent && parent->changed)) {
             if (node->dirty) node->local = es_mat4_from_trs(node->transform.translation, node->transform.rotation, node->transform.scale);
             node->dirty = false;
-            es_mat4 to_world = parent ? es_mat4_mul(parent->world, node->local) : node->local;
-            node->changed = node->fresh || memcmp(&to_world, &node->world, sizeof to_world) != 0;
-            node->world = to_world;
+            es_mat4 old = node->world;
+            double old_position[3];
+            memcpy(old_position, node->position, sizeof old_position);
+            place(node, parent);
+            node->changed = node->fresh || memcmp(&old, &node->world, sizeof old) != 0 || memcmp(old_position, node->position, sizeof old_position) != 0;
             any |= node->changed;
         }
-        if (node->fresh || !world->stepped) node->previous = node->world;
+        if (node->fresh || !world->stepped) es_node_settle(node);
         node->fresh = false;
     }
     if (any) world->list_dirty = world->lights_dirty = world->camera_dirty = world->nodes_moving = true;

@@ -139,7 +139,7 @@ ES_API es_result es_world_get_camera(const es_world* world, es_camera camera, es
 /* The camera that es_renderer_render looks through: the first one added, until another is set; null when the world has none. */
 ES_API es_camera es_world_active_camera(const es_world* world);
 ES_API es_result es_world_set_active_camera(es_world* world, es_camera camera);
-/* This frame's and last frame's view of a camera, for drawing. */
+/* This frame's and last frame's view of a camera, for drawing; what it transforms is relative to es_world_origin. */
 ES_API es_result es_world_camera_view(const es_world* world, es_camera camera, uint32_t width, uint32_t height, es_raster_view* view);
 
 typedef enum es_light_type { ES_LIGHT_SPOT, ES_LIGHT_POINT, ES_LIGHT_DIRECTIONAL } es_light_type;
@@ -211,13 +211,19 @@ ES_API const char* es_world_name(const es_world* world, es_object_kind kind, uin
 
 /* ---- what the light reads ---------------------------------------------------------------------------------------------------------------------------- */
 
+/* Draw list, camera views, lights and bounds are relative to an origin in world coordinates, so that what is small beside its distance
+ * from zero keeps its precision (nodes are placed in double). It is zero while the active camera is within 32 diagonals of the world's
+ * bounds from zero, and otherwise near the camera: a multiple of 64 diagonals, rounded up to a power of two. Where it changes, the
+ * geometry counts as changed. */
+ES_API void es_world_origin(const es_world* world, double origin[3]);
+
 /* Visible instances in slot order, with their transforms now and last frame; G-buffer id = slot index. */
 ES_API const es_draw_list* es_world_draw_list(const es_world* world);
 
 typedef struct es_light_state {
     es_light handle;
     es_light_type type;
-    es_vec3 position, direction;      /* direction: the way the light travels along its axis, unit */
+    es_vec3 position, direction;      /* position: relative to es_world_origin; direction: the way the light travels along its axis, unit */
     float radiant[3];                 /* color × intensity: W/sr, or W/m² for directional */
     float cos_inner, cos_outer;       /* spot */
     float range;
@@ -235,7 +241,7 @@ typedef struct es_world_revisions {
     bool moving;          /* some previous transform, vertex or view differs from the present one */
 } es_world_revisions;
 ES_API es_world_revisions es_world_get_revisions(const es_world* world);
-/* World-space bounds of everything visible; false when there is nothing. */
+/* Bounds of everything visible along the world's axes; false when there is nothing. */
 ES_API bool es_world_bounds(const es_world* world, es_vec3* minimum, es_vec3* maximum);
 
 #ifdef __cplusplus

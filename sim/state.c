@@ -35,6 +35,14 @@ static void transfer(state_io* io, void* data, size_t size)
 static void visit_u32(state_io* io, uint32_t* value) { transfer(io, value, sizeof *value); }
 static void visit_floats(state_io* io, float* values, size_t count) { transfer(io, values, count * sizeof *values); }
 
+/* Within what a float holds: matrices are rounded from it. */
+static void visit_position(state_io* io, double position[3])
+{
+    transfer(io, position, 3 * sizeof *position);
+    if (!reading(io)) return;
+    for (int k = 0; k < 3; k++) io->good &= position[k] >= -3e38 && position[k] <= 3e38;
+}
+
 static void visit_flag(state_io* io, bool* flag)
 {
     uint32_t word = *flag;
@@ -47,15 +55,19 @@ static void visit_node(es_world* world, state_io* io, es_node_object* node)
 {
     es_transform transform = node->transform, resolved;
     es_mat4 previous = node->previous;
+    double previous_position[3];
+    memcpy(previous_position, node->previous_position, sizeof previous_position);
     visit_floats(io, &transform.translation.x, 3);
     visit_floats(io, &transform.rotation.x, 4);
     visit_floats(io, &transform.scale.x, 3);
     visit_floats(io, previous.m, 16);
+    visit_position(io, previous_position);
     if (!reading(io) || !io->good) return;
     io->good = es_transform_resolve(&transform, &resolved);
     if (io->mode != APPLY) return;
     node->transform = transform;
     node->previous = previous;
+    memcpy(node->previous_position, previous_position, sizeof previous_position);
     node->dirty = world->nodes_dirty = true;
 }
 
@@ -90,14 +102,18 @@ static void visit_camera(es_world* world, state_io* io, es_camera_object* camera
 {
     es_camera_desc desc = camera->desc, previous = camera->previous;
     es_mat4 previous_world = camera->previous_world;
+    double previous_position[3];
+    memcpy(previous_position, camera->previous_position, sizeof previous_position);
     visit_lens(world, io, &desc);
     previous.node = desc.node; /* last frame's node may be gone; its matrix is what counts */
     visit_lens(world, io, &previous);
     visit_floats(io, previous_world.m, 16);
+    visit_position(io, previous_position);
     if (io->mode != APPLY || !io->good) return;
     es_world_set_camera(world, (es_camera){camera->object.id}, &desc);
     camera->previous = previous;
     camera->previous_world = previous_world;
+    memcpy(camera->previous_position, previous_position, sizeof previous_position);
 }
 
 static void visit_light(es_world* world, state_io* io, es_light_object* light)
@@ -244,7 +260,7 @@ static uint64_t content_signature(const es_world* world)
 }
 
 typedef struct state_header { char magic[8]; uint64_t content, payload; } state_header;
-static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '2'};
+static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '3'};
 
 es_result es_world_save(const es_world* world, void* buffer, size_t* size)
 {

@@ -135,6 +135,7 @@ void es_world_refresh(const es_world* world)
     if (!(w->nodes_dirty || w->order_dirty || w->list_dirty || w->lights_dirty || w->camera_dirty)) return;
     es_fp_environment environment = es_fp_enter();
     es_nodes_refresh(w);
+    if (es_origin_refresh(w)) w->list_dirty = w->lights_dirty = w->camera_dirty = true;
     es_draw_list_refresh(w);
     es_lights_refresh(w);
     es_camera_refresh(w);
@@ -150,7 +151,7 @@ void es_world_settle(es_world* world)
         world->list_dirty = world->camera_dirty = true;
         for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_NODE].slot_count; slot++) {
             es_node_object* node = es_slots_at(&world->slots[ES_OBJECT_NODE], slot);
-            if (node) node->previous = node->world;
+            if (node) es_node_settle(node);
         }
     }
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_CAMERA].slot_count; slot++) {
@@ -158,6 +159,7 @@ void es_world_settle(es_world* world)
         if (!camera) continue;
         camera->previous = camera->desc;
         camera->previous_world = *es_node_world(world, camera->desc.node);
+        memcpy(camera->previous_position, es_node_position(world, camera->desc.node), sizeof camera->previous_position);
         world->camera_dirty |= world->camera_moving;
     }
 }

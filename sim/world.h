@@ -35,6 +35,7 @@ typedef struct es_node_object {
     es_node parent;
     es_transform transform;
     es_mat4 local, world, previous;
+    double position[3], previous_position[3]; /* translations of `world` and `previous` before they are rounded */
     uint32_t depth;          /* of the root's children: 0 */
     uint32_t played_by;      /* the clip that took the node when the world was opened */
     bool dirty;              /* `transform` changed since the last refresh */
@@ -49,6 +50,7 @@ typedef struct es_camera_object {
     es_camera_desc desc;     /* name NULL */
     es_camera_desc previous;
     es_mat4 previous_world;
+    double previous_position[3];
     bool fresh;
 } es_camera_object;
 
@@ -92,7 +94,10 @@ struct es_world {
     bool geometry_touched;         /* an instance or mesh certainly differs */
     bool instances_moving;
     bool has_bounds;
-    es_vec3 bounds_min, bounds_max;
+    es_vec3 bounds_min, bounds_max; /* relative to the origin */
+
+    double origin[3];              /* what the light reads is relative to it */
+    double cell;                   /* the origin is a multiple of it; 0 without geometry */
 
     es_light_state* lights;
     size_t light_capacity, light_count;
@@ -128,9 +133,16 @@ void es_camera_refresh(es_world* world);
 void es_world_settle(es_world* world);
 void es_meshes_settle(es_world* world);
 bool es_draw_list_reserve(es_world* world);
+void es_node_settle(es_node_object* node);
+/* Puts the origin near the active camera; false when it stays where it was. */
+bool es_origin_refresh(es_world* world);
 /* The null handle stands for the world's own axes. */
 const es_mat4* es_node_world(const es_world* world, es_node node);
 const es_mat4* es_node_previous(const es_world* world, es_node node);
+const double* es_node_position(const es_world* world, es_node node);
+const double* es_node_previous_position(const es_world* world, es_node node);
+/* The matrix with its translation `position` relative to the world's origin. */
+es_mat4 es_relative_matrix(const es_world* world, const es_mat4* matrix, const double position[3]);
 /* The transform with zero-initialised parts replaced and the rotation made unit; false when a number is out of range. */
 bool es_transform_resolve(const es_transform* transform, es_transform* resolved);
 
