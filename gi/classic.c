@@ -45,8 +45,8 @@ es_result es_classic_map_draw(es_rasterizer* rasterizer, const es_draw_list* lis
                         face = f + 1;
                     }
                 es_vec3 d = es_v3_add(es_v3_add(es_v3_scale(t, qx), es_v3_scale(b, qy)), es_v3_scale(n, qz));
-                es_vec3 p = es_v3_add(position, d);
-                es_vec4 clip = es_mat4_vec4(&to_clip[face], (es_vec4){p.x, p.y, p.z, 1.0f});
+                /* the light itself is at the centre of projection: of a point in this direction only the direction matters */
+                es_vec4 clip = es_mat4_vec4(&to_clip[face], (es_vec4){d.x, d.y, d.z, 0.0f});
                 float px = es_clampf((clip.x / clip.w * 0.5f + 0.5f) * (float)side, 0.0f, (float)(side - 1));
                 float py = es_clampf((0.5f - clip.y / clip.w * 0.5f) * (float)side, 0.0f, (float)(side - 1));
                 float depth = scratch[(size_t)face * side * side + (size_t)(uint32_t)py * side + (uint32_t)px];

@@ -36,7 +36,7 @@ typedef struct es_renderer_settings {
     uint32_t vpls;                   /* per frame, over all lights */
     uint32_t light_size;             /* texels of the light G-buffer's side, a power of two */
     uint32_t seed;                   /* of the sample sets */
-    float geometry_bound;            /* 1/m²: cos cos / d² of a pair is cut off here (Knecht eq. 4.7 with 1/bound = d²min) */
+    float geometry_bound;            /* cos cos / d² of a pair is cut off here, d as a share of the scene's extent (Knecht eq. 4.7 with 1/bound = d²min) */
     float spread;                    /* how far a light's own area softens it close by: 0 a point, 1 a disc of that area */
     bool view_importance;            /* more lights where they matter for what the camera sees */
     float lobe_roughness;            /* lobes sharper than this GGX roughness are widened to it under virtual point lights */

@@ -31,7 +31,7 @@ static void face_views(es_light_view* view, uint32_t size, es_vec3 low, es_vec3 
     const es_light_state* light = &view->light;
     es_raster_view views[6];
     es_vec3 centre = es_v3_scale(es_v3_add(low, high), 0.5f);
-    float radius = es_maxf(0.5f * es_v3_length(es_v3_sub(high, low)), 1e-6f);
+    float radius = es_maxf(0.5f * es_v3_length(es_v3_sub(high, low)), 1e-9f);
     if (view->orthographic) {
         /* one square over the bounding sphere: its size does not change while the light turns, so texels keep theirs */
         es_vec3 eye = es_v3_sub(centre, es_v3_scale(light->direction, radius * 1.01f));
@@ -68,7 +68,7 @@ es_result es_light_view_prepare(es_context* context, es_light_view* view, const 
     bool cube = light->type == ES_LIGHT_POINT || (light->type == ES_LIGHT_SPOT && light->cos_outer < es_cos(ES_SPOT_VIEW_MAX_ANGLE));
     uint32_t face_count = cube ? 6 : 1;
     float extent = es_v3_length(es_v3_sub(high, low));
-    view->near_plane = es_maxf(extent * 1e-3f, 1e-6f);
+    view->near_plane = es_maxf(extent * 1e-3f, 1e-9f);
     for (uint32_t i = 0; i < 6; i++) {
         es_light_face* face = &view->faces[i];
         bool wanted = i < face_count;

@@ -418,7 +418,7 @@ static es_result pass_shading(es_renderer* r, const frame_inputs* in)
     if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, &r->gbuffer);
     if (result) return result;
     es_shade_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
-        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = s->geometry_bound, .interleave = s->interleave};
+        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = s->geometry_bound / (in->extent * in->extent), .interleave = s->interleave};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = r->irradiance.at[k];
         job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;
@@ -517,7 +517,7 @@ static es_result render(es_renderer* r, es_world* world)
     in.lights = es_world_lights(world, &light_count);
     in.light_count = (uint32_t)light_count;
     in.has_geometry = es_world_bounds(world, &in.bounds_min, &in.bounds_max);
-    in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-6f) : 1.0f;
+    in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-9f) : 1.0f;
     const es_renderer_settings* s = &r->settings;
     in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
 

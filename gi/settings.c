@@ -19,7 +19,7 @@ static const es_setting renderer_table[] = {
     {"vpl.count", ES_SETTING_INT, "1024", 0, 16384, NULL, "virtual point lights per frame", AT(vpls)},
     {"vpl.light-size", ES_SETTING_INT, "256", 8, 2048, NULL, "texels of a light G-buffer's side, a power of two", AT(light_size)},
     {"vpl.seed", ES_SETTING_INT, "0", 0, 1000000, NULL, "offset into the Halton sequence", AT(seed)},
-    {"vpl.bound", ES_SETTING_FLOAT, "500", 0.001, 1000000, NULL, "largest geometry term cos cos / d², 1/m²", AT(geometry_bound)},
+    {"vpl.bound", ES_SETTING_FLOAT, "16000", 0.01, 1e9, NULL, "largest geometry term cos cos / d², d as a share of the scene's extent", AT(geometry_bound)},
     {"vpl.spread", ES_SETTING_FLOAT, "2", 0, 100, NULL, "how far a light's own area softens it close by: 0 a point, 1 a disc", AT(spread)},
     {"vpl.view-importance", ES_SETTING_BOOL, "true", 0, 1, NULL, "more lights where they matter for what the camera sees", AT(view_importance)},
     {"vpl.roughness", ES_SETTING_FLOAT, "0.5", 0, 1, NULL, "lobes sharper than this are widened to it, or each light would show as a spot", AT(lobe_roughness)},

@@ -67,7 +67,7 @@ static es_renderer_settings settings_of(uint32_t method)
     s.interleave = 4;
     s.view_importance = false;
     s.spread = 0;
-    s.geometry_bound = 1e6f;
+    s.geometry_bound = 1e8f;
     return s;
 }
 

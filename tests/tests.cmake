@@ -2,7 +2,8 @@
 #
 # test_*.c and check_*.c are programs linked with the static library, with cmocka and with the private headers; check_*.c
 # compare kernels with their scalar bodies and are built for other processors too. *.sh are called as `bash SCRIPT BUILD_DIR SOURCE_DIR` and may skip with exit 77. A new file is picked up by its name alone.
-# Labels: unit (the programs), threaded (those that make contexts of several threads), script.
+# stress/*.c try to break numbers: scales, places, shapes, lights and cameras out of the ordinary; they become stress_*.
+# Labels: unit (the programs), stress, threaded (those that make contexts of several threads), script.
 
 if(NOT EARTHSHINE_TESTS)
   return()
@@ -38,12 +39,18 @@ set(test_environment
 file(GLOB test_programs CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/check_*.c)
 if(CMOCKA_FOUND)
   file(GLOB more_programs CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/test_*.c)
-  list(APPEND test_programs ${more_programs})
+  file(GLOB stress_programs CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/tests/stress/*.c)
+  list(APPEND test_programs ${more_programs} ${stress_programs})
 else()
   message(STATUS "no cmocka for ${CMAKE_SYSTEM_PROCESSOR}: of the unit tests only check_*.c are built, with tests/without_cmocka")
 endif()
 foreach(source ${test_programs})
   get_filename_component(name ${source} NAME_WE)
+  set(labels unit)
+  if(source MATCHES "/stress/")
+    set(name stress_${name})
+    set(labels stress)
+  endif()
   add_executable(${name} ${source})
   target_link_libraries(${name} PRIVATE earthshine Threads::Threads m)
   if(CMOCKA_FOUND)
@@ -64,7 +71,6 @@ foreach(source ${test_programs})
     endif()
   endforeach()
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_BINARY_DIR})
-  set(labels unit)
   file(STRINGS ${source} threads_used REGEX "threads *= *([2-9]|[a-z])" LIMIT_COUNT 1)
   if(threads_used)
     list(APPEND labels threaded)

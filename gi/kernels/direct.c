@@ -80,6 +80,8 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
     const es_light_view* view = job->view;
     const es_light_state* light = &view->light;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
+    /* a millionth of the scene's extent: a light in a surface leaves its neighbourhood finite */
+    const float nearest = view->near_plane * 1e-3f;
     const float cone_scale = 1.0f / (light->cos_inner - light->cos_outer > 1e-6f ? light->cos_inner - light->cos_outer : 1e-6f);
     for (uint32_t y = row_begin; y < row_end; y++) {
         float fy = (float)y;
@@ -107,7 +109,7 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                     lx = vf_set1(light->position.x) - px;
                     ly = vf_set1(light->position.y) - py;
                     lz = vf_set1(light->position.z) - pz;
-                    vf d2 = vf_max(lx * lx + ly * ly + lz * lz, vf_set1(1e-12f));
+                    vf d2 = vf_max(lx * lx + ly * ly + lz * lz, vf_set1(nearest * nearest));
                     vf d = vf_sqrt(d2), inverse = one / d;
                     lx = lx * inverse;
                     ly = ly * inverse;

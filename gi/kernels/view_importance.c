@@ -5,7 +5,7 @@
 
 void ES_KERNEL(es_gi_view_importance)(const es_receivers* receivers, const es_sender* senders, uint32_t count, float* result)
 {
-    const vf zero = vf_zero(), softening = vf_set1(receivers->softening), tiny = vf_set1(1e-12f);
+    const vf zero = vf_zero(), softening = vf_set1(receivers->softening), tiny = vf_set1(receivers->softening * 0x1p-24f + 0x1p-100f);
     for (uint32_t i = 0; i < count; i++) {
         const es_sender* s = &senders[i];
         const vf ox = vf_set1(s->position[0]), oy = vf_set1(s->position[1]), oz = vf_set1(s->position[2]);
