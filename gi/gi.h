@@ -178,27 +178,30 @@ typedef struct es_image_error {
     double relrmse;           /* rmse / mean(B) */
     double relmse;            /* mean(d² / (B² + 0.01)) (Rousselle et al. 2011) */
     double rell1;             /* mean(|d|) / mean(B) */
-    double flip;              /* mean ꟻLIP 0 … 1 (Andersson et al. 2020), after the tone map of the display; NaN with fewer than three channels */
-    double hdr_flip;          /* mean HDR-ꟻLIP (Andersson et al. 2021), over the exposures it chooses; NaN likewise */
+    double flip;              /* mean ꟻLIP 0 … 1 (Andersson et al. 2020), after the default tone map; NaN with fewer than three channels */
+    double hdr_flip;          /* mean HDR-ꟻLIP (Andersson et al. 2021), over the exposures that B asks for, by its ACES curve; NaN likewise */
     double max;               /* largest |d| */
     double mean, reference_mean; /* of the finite values */
     uint64_t samples;         /* compared values */
 } es_image_error;
 
 typedef struct es_error_desc {
-    bool flip;                /* compute flip and hdr_flip, which take longer than all the others */
-    float pixels_per_degree;  /* of the viewer; 0: 67.0206, a 0.7 m wide screen of 3840 pixels seen from 0.7 m */
+    bool flip;                /* compute flip and hdr_flip, which take longer than all the others; false: they are NaN */
+    float pixels_per_degree;  /* of the viewer, 10 … 450; 0: 67.0206, a 0.7 m wide screen of 3840 pixels seen from 0.7 m */
     bool display_referred;    /* A and B are linear 0 … 1 (a PNG): flip takes them as they are and hdr_flip is NaN */
     const uint8_t* mask;      /* one byte per pixel, zero leaves it out; NULL: all. ꟻLIP filters over all pixels and averages over these */
 } es_error_desc;
 
 /* Channels of the same name are compared, alpha only when there is nothing else; by position when no name is shared and the counts
- * are equal. INVALID_ARGUMENT when the sizes differ or nothing can be compared. desc NULL: everything, no mask. */
+ * are equal. ꟻLIP takes R, G and B, or the first three where these names are missing; to its filters negative values and what is not finite
+ * are black, and a pixel that is not finite in one picture and not the same in the other has error 1. INVALID_ARGUMENT when the sizes differ
+ * or nothing can be compared. desc NULL: everything, no mask. */
 ES_API es_result es_image_compare(es_context* context, const es_image* a, const es_image* b, const es_error_desc* desc, es_image_error* error);
 
 typedef enum es_error_map { ES_ERROR_MAP_ABSOLUTE, ES_ERROR_MAP_RELATIVE, ES_ERROR_MAP_SIGNED, ES_ERROR_MAP_FLIP, ES_ERROR_MAP_HDR_FLIP } es_error_map;
 /* The error of each pixel as one channel whose mean is the measure; pixels the mask leaves out are 0. ABSOLUTE: mean of |d| over channels,
- * RELATIVE: of d² / (B² + 0.01), SIGNED: of d. desc NULL: no mask. The caller destroys it. INVALID_ARGUMENT as es_image_compare. */
+ * RELATIVE: of d² / (B² + 0.01), SIGNED: of d. desc NULL: no mask. The caller destroys it. INVALID_ARGUMENT as es_image_compare, and for
+ * the ꟻLIPs that would be NaN there. */
 ES_API es_result es_image_error_map(es_context* context, const es_image* a, const es_image* b, es_error_map map, const es_error_desc* desc, es_image* result);
 /* One channel to false colour, sRGB samples (save them with es_image_save_desc.already_srgb): 0 … scale by the map "magma", from black over
  * purple, red and orange to pale yellow, lightness rising evenly; is_signed: from light blue (-scale) over black to yellow (+scale), equally

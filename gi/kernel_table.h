@@ -4,6 +4,7 @@
 
 #include "gi/compose.h"
 #include "gi/direct.h"
+#include "gi/error/flip.h"
 #include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/pixel_rays.h"
@@ -23,6 +24,8 @@
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
+    /* the tile whose first pixel is (x, y), once it is loaded */                                                \
+    X(flip, (const es_flip_job* job, uint32_t x, uint32_t y, const es_flip_scratch* scratch))                    \
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
     X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))
 

@@ -243,6 +243,203 @@ static void test_false_colour(void** state)
     es_image_destroy(*state, &values);
 }
 
+/* ---- FLIP --------------------------------------------------------------------------------------------------------------------------- */
+
+/* The pictures of tests/independent_flip.py. */
+static es_image picture(es_context* context, uint32_t width, uint32_t height, uint32_t seed, int high)
+{
+    es_image image = make(context, width, height, 3, NULL);
+    uint64_t random = seed;
+    for (uint32_t y = 0; y < height; y++)
+        for (uint32_t x = 0; x < width; x++)
+            for (uint32_t c = 0; c < 3; c++) {
+                random = (random * 1103515245 + 12345) % (1u << 31);
+                float value = (float)(random >> 16 & 63) / 256 + (float)((x * (c + 1) + y * 3) % 32) / 64 + ((x / 5 + y / 4) % 2 ? 0.25f : 0);
+                value = high ? ldexpf(value, high * (int)(x + y * 2) / (int)(width + 2 * height) - 2) : value < 1 ? value : 1;
+                image.pixels[3 * (y * width + x) + c] = value;
+            }
+    return image;
+}
+
+static es_image flat(es_context* context, uint32_t side, float r, float g, float b)
+{
+    es_image image = make(context, side, side, 3, NULL);
+    for (uint32_t i = 0; i < side * side; i++) image.pixels[3 * i] = r, image.pixels[3 * i + 1] = g, image.pixels[3 * i + 2] = b;
+    return image;
+}
+
+typedef struct flip_values { double mean, largest, first, middle, last; } flip_values;
+
+static void check_flip(es_context* context, es_image* a, es_image* b, es_error_map kind, const es_error_desc* desc, flip_values expected)
+{
+    const double tolerance = 3e-6; /* of single precision */
+    es_image map;
+    es_error_desc full = *desc;
+    full.flip = true;
+    es_image_error error = compared(context, a, b, &full);
+    assert_int_equal(es_image_error_map(context, a, b, kind, desc, &map), ES_OK);
+    uint32_t count = map.width * map.height;
+    flip_values got = {kind == ES_ERROR_MAP_FLIP ? error.flip : error.hdr_flip, 0, map.pixels[0], map.pixels[map.height / 2 * map.width + map.width / 2], map.pixels[count - 1]};
+    for (uint32_t i = 0; i < count; i++) got.largest = fmax(got.largest, (double)map.pixels[i]);
+    const double *p = &got.mean, *q = &expected.mean;
+    for (int k = 0; k < 5; k++)
+        if (!(fabs(p[k] - q[k]) < tolerance)) fail_msg("value %d of FLIP is %.9f instead of %.9f", k, p[k], q[k]);
+    es_image_destroy(context, &map);
+    es_image_destroy(context, a);
+    es_image_destroy(context, b);
+}
+
+/* Expected values by tests/independent_flip.py. */
+static void test_flip_independent(void** state)
+{
+    const es_error_desc shown = {.display_referred = true}, coarse = {.display_referred = true, .pixels_per_degree = 30};
+    es_image a = picture(*state, 22, 17, 1, 0), b = picture(*state, 22, 17, 2, 0);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_FLIP, &shown, (flip_values){0.146771044, 0.375977769, 0.375977769, 0.152318654, 0.189995208});
+    a = picture(*state, 22, 17, 1, 0), b = picture(*state, 22, 17, 2, 0);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_FLIP, &coarse, (flip_values){0.296455213, 0.619500723, 0.531141476, 0.381662991, 0.309635839});
+    a = flat(*state, 9, 0.25f, 0.5f, 0.125f), b = flat(*state, 9, 0.5f, 0.5f, 0.125f);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_FLIP, &shown, (flip_values){0.435721519, 0.435721519, 0.435721519, 0.435721519, 0.435721519});
+    a = flat(*state, 9, 0, 0, 0), b = flat(*state, 9, 1, 1, 1);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_FLIP, &shown, (flip_values){0.967379763, 0.967379763, 0.967379763, 0.967379763, 0.967379763});
+    a = flat(*state, 9, 0, 0, 1), b = flat(*state, 9, 0, 1, 0);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_FLIP, &shown, (flip_values){1, 1, 1, 1, 1});
+}
+
+static void test_hdr_flip_independent(void** state)
+{
+    const es_error_desc forty = {.pixels_per_degree = 40};
+    es_image a = picture(*state, 15, 12, 3, 10), b = picture(*state, 15, 12, 4, 10);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_HDR_FLIP, &forty, (flip_values){0.221319254, 0.612280399, 0.289021209, 0.559103294, 0.264794064});
+    a = picture(*state, 15, 12, 3, 10), b = picture(*state, 15, 12, 4, 10);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_FLIP, &forty, (flip_values){0.199773502, 0.618164083, 0.380155291, 0.322352816, 0.076576104});
+    a = picture(*state, 15, 11, 5, 3), b = picture(*state, 15, 11, 6, 3);
+    check_flip(*state, &a, &b, ES_ERROR_MAP_HDR_FLIP, &forty, (flip_values){0.236520955, 0.816879824, 0.729705412, 0.099768506, 0.160298534});
+}
+
+static void test_flip_properties(void** state)
+{
+    const es_error_desc linear = {.flip = true, .display_referred = true};
+    es_image a = noise(*state, 40, 30, 1, 0, 1), b = noise(*state, 40, 30, 2, 0, 1), grey = flat(*state, 30, 0.3f, 0.3f, 0.3f), other = flat(*state, 30, 0, 0, 0), map;
+    es_image_error same = compared(*state, &a, &a, &(es_error_desc){.flip = true}), ab = compared(*state, &a, &b, &linear), ba = compared(*state, &b, &a, &linear);
+    assert_true(same.flip == 0 && same.hdr_flip == 0 && ab.flip > 0 && ab.flip == ba.flip);
+    assert_true(isnan(ab.hdr_flip));
+    double last = 0;
+    for (int k = 1; k <= 7; k++) { /* farther from grey, by lightness alone */
+        for (int i = 0; i < 30 * 30 * 3; i++) other.pixels[i] = 0.3f + 0.1f * (float)k;
+        double flip = compared(*state, &other, &grey, &linear).flip;
+        assert_true(flip > last && flip < 1);
+        last = flip;
+    }
+    /* a mean over what the mask leaves; the filters see everything */
+    uint8_t mask[40 * 30] = {0};
+    for (int i = 0; i < 40 * 30; i += 3) mask[i] = 1;
+    es_error_desc masked = linear;
+    masked.mask = mask;
+    assert_int_equal(es_image_error_map(*state, &a, &b, ES_ERROR_MAP_FLIP, &linear, &map), ES_OK);
+    double sum = 0;
+    for (int i = 0; i < 40 * 30; i += 3) sum += (double)map.pixels[i];
+    near(compared(*state, &a, &b, &masked).flip, sum / 400, 1e-12);
+    es_image_destroy(*state, &map);
+    assert_int_equal(es_image_error_map(*state, &a, &b, ES_ERROR_MAP_FLIP, &masked, &map), ES_OK);
+    for (int i = 0; i < 40 * 30; i++) assert_true((map.pixels[i] > 0) == (i % 3 == 0));
+    es_image_destroy(*state, &map);
+    es_image_destroy(*state, &a);
+    es_image_destroy(*state, &b);
+    es_image_destroy(*state, &grey);
+    es_image_destroy(*state, &other);
+}
+
+/* A spot has the same map wherever it lies: nothing is seen of the tiles that the work is divided into. */
+static void test_flip_has_no_seams(void** state)
+{
+    enum { W = 180, H = 150, REACH = 12 };
+    static const uint32_t places[4][2] = {{30, 30}, {62, 63}, {128, 64}, {150, 127}};
+    es_image maps[4];
+    for (int p = 0; p < 4; p++) {
+        es_image a = make(*state, W, H, 3, NULL), b = make(*state, W, H, 3, NULL);
+        for (int i = 0; i < W * H * 3; i++) a.pixels[i] = b.pixels[i] = 0.25f;
+        a.pixels[3 * (places[p][1] * W + places[p][0])] = 1;
+        b.pixels[3 * (places[p][1] * W + places[p][0] + 1) + 1] = 0.5f;
+        assert_int_equal(es_image_error_map(*state, &a, &b, ES_ERROR_MAP_FLIP, &(es_error_desc){.display_referred = true}, &maps[p]), ES_OK);
+        es_image_destroy(*state, &a);
+        es_image_destroy(*state, &b);
+        for (int dy = -REACH; dy <= REACH; dy++)
+            for (int dx = -REACH; dx <= REACH; dx++) {
+                float here = maps[p].pixels[((int)places[p][1] + dy) * W + (int)places[p][0] + dx], first = maps[0].pixels[(30 + dy) * W + 30 + dx];
+                assert_true(here == first);
+                if (dx < -10 || dx > 11 || dy < -10 || dy > 10) assert_true(here == 0); /* beyond the filters */
+                if (dx >= -2 && dx <= 3 && dy >= -2 && dy <= 2) assert_true(here > 0);
+            }
+    }
+    for (int p = 0; p < 4; p++) es_image_destroy(*state, &maps[p]);
+}
+
+static void test_hdr_flip_follows_the_scale(void** state)
+{
+    es_image a = picture(*state, 20, 16, 8, 9), b = picture(*state, 20, 16, 9, 9);
+    double expected = compared(*state, &a, &b, NULL).hdr_flip;
+    for (int k = -80; k <= 80; k += 40) {
+        es_image c = make(*state, 20, 16, 3, NULL), d = make(*state, 20, 16, 3, NULL);
+        for (int i = 0; i < 20 * 16 * 3; i++) c.pixels[i] = ldexpf(a.pixels[i], k), d.pixels[i] = ldexpf(b.pixels[i], k);
+        near(compared(*state, &c, &d, NULL).hdr_flip, expected, 1e-4);
+        es_image_destroy(*state, &c);
+        es_image_destroy(*state, &d);
+    }
+    es_image_destroy(*state, &a);
+    es_image_destroy(*state, &b);
+}
+
+/* Values that no renderer should write: every error stays in [0, 1], and what is not finite has all of it. */
+static void test_flip_of_extremes(void** state)
+{
+    static const float values[] = {0, -1, -1e38f, 1e38f, 3.4e38f, 1e-40f, 1e-45f, 1e-20f, 1e20f, 1, NAN, INFINITY, -INFINITY};
+    enum { N = sizeof values / sizeof values[0] };
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            es_image a = flat(*state, 4, 0.5f, 0.5f, 0.5f), b = flat(*state, 4, 0.5f, 0.5f, 0.5f), map;
+            a.pixels[21] = values[i];
+            b.pixels[21] = values[j];
+            b.pixels[32] = values[j] * 0.5f;
+            bool wrong = (!isfinite(values[i]) || !isfinite(values[j])) && !(values[i] == values[j] || (isnan(values[i]) && isnan(values[j])));
+            for (int m = ES_ERROR_MAP_FLIP; m <= ES_ERROR_MAP_HDR_FLIP; m++) {
+                assert_int_equal(es_image_error_map(*state, &a, &b, (es_error_map)m, NULL, &map), ES_OK);
+                for (int k = 0; k < 16; k++) assert_true(map.pixels[k] >= 0 && map.pixels[k] <= 1);
+                if (wrong) assert_true(map.pixels[7] == 1);
+                es_image_destroy(*state, &map);
+            }
+            es_image_destroy(*state, &a);
+            es_image_destroy(*state, &b);
+        }
+    es_image black = flat(*state, 4, 0, 0, 0), lit = flat(*state, 4, 0, 0, 0);
+    lit.pixels[10] = 2;
+    assert_true(compared(*state, &black, &black, NULL).hdr_flip == 0);
+    assert_true(compared(*state, &lit, &black, NULL).hdr_flip > 0);
+    assert_true(compared(*state, &black, &lit, NULL).hdr_flip > 0); /* more than half is black */
+    es_image_destroy(*state, &black);
+    es_image_destroy(*state, &lit);
+}
+
+static void test_flip_refusals(void** state)
+{
+    es_image a = flat(*state, 4, 0.5f, 0.5f, 0.5f), single = make(*state, 4, 4, 1, NULL), map;
+    es_image_error error;
+    static const float densities[] = {-1, 1, 451, 1e30f, NAN, INFINITY};
+    for (size_t i = 0; i < sizeof densities / sizeof densities[0]; i++) {
+        es_error_desc desc = {.flip = true, .pixels_per_degree = densities[i]};
+        assert_int_equal(es_image_compare(*state, &a, &a, &desc, &error), ES_INVALID_ARGUMENT);
+        assert_int_equal(es_image_error_map(*state, &a, &a, ES_ERROR_MAP_FLIP, &desc, &map), ES_INVALID_ARGUMENT);
+        assert_null(map.pixels);
+    }
+    for (float density = 10; density <= 450; density += 44)
+        assert_int_equal(es_image_compare(*state, &a, &a, &(es_error_desc){.flip = true, .pixels_per_degree = density}, &error), ES_OK);
+    assert_int_equal(es_image_compare(*state, &single, &single, NULL, &error), ES_OK);
+    assert_true(isnan(error.flip) && isnan(error.hdr_flip));
+    assert_int_equal(es_image_error_map(*state, &single, &single, ES_ERROR_MAP_FLIP, NULL, &map), ES_INVALID_ARGUMENT);
+    assert_int_equal(es_image_error_map(*state, &a, &a, ES_ERROR_MAP_HDR_FLIP, &(es_error_desc){.display_referred = true}, &map), ES_INVALID_ARGUMENT);
+    es_image_destroy(*state, &a);
+    es_image_destroy(*state, &single);
+}
+
 /* ---- sequences ---------------------------------------------------------------------------------------------------------------------- */
 
 /* B: 1, 2, 4 everywhere. A: 2, 3, 7: changes by 1 and 4 where B's are 1 and 2. Mean of B 7/3. */
@@ -322,13 +519,13 @@ static void test_flicker_not_finite(void** state)
 
 static void everything(es_context* context, uint8_t* bytes, size_t size)
 {
-    es_image a = noise(context, 45, 37, 5, 0, 3), b = noise(context, 45, 37, 6, 0, 3), map;
+    es_image a = noise(context, 77, 67, 5, 0, 3), b = noise(context, 77, 67, 6, 0, 3), map; /* four tiles */
     es_flicker* flicker;
     size_t at = 0;
     es_image_error error = compared(context, &a, &b, NULL);
     memcpy(bytes, &error, sizeof error);
     at += sizeof error;
-    for (int m = ES_ERROR_MAP_ABSOLUTE; m <= ES_ERROR_MAP_SIGNED; m++) {
+    for (int m = ES_ERROR_MAP_ABSOLUTE; m <= ES_ERROR_MAP_HDR_FLIP; m++) {
         assert_int_equal(es_image_error_map(context, &a, &b, (es_error_map)m, NULL, &map), ES_OK);
         uint64_t hash = es_image_hash(&map);
         memcpy(bytes + at, &hash, sizeof hash);
@@ -370,6 +567,13 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_channels, setup, teardown),
         cmocka_unit_test_setup_teardown(test_maps, setup, teardown),
         cmocka_unit_test_setup_teardown(test_false_colour, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_flip_independent, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_hdr_flip_independent, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_flip_properties, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_flip_has_no_seams, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_hdr_flip_follows_the_scale, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_flip_of_extremes, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_flip_refusals, setup, teardown),
         cmocka_unit_test_setup_teardown(test_flicker_by_hand, setup, teardown),
         cmocka_unit_test_setup_teardown(test_flicker_of_noise, setup, teardown),
         cmocka_unit_test_setup_teardown(test_flicker_not_finite, setup, teardown),

@@ -1,6 +1,6 @@
 /* The plain measures of error. Each row has its own sums, in pixel order, and the rows' are added up in order: the same bits for any
  * number of threads. */
-#include "gi/error/error.h"
+#include "gi/error/flip.h"
 #include "platform/context.h"
 
 typedef struct row_sums {
@@ -43,12 +43,14 @@ static void compare_rows(void* user, uint32_t begin, uint32_t end, uint32_t work
     const compare_job* job = user;
     const size_t width = job->a->width;
     (void)worker;
+    es_fp_environment environment = es_fp_enter_untrapped();
     for (uint32_t y = begin; y < end; y++) {
         row_sums sums = {0};
         for (size_t i = y * width; i < (y + 1) * width; i++)
             if (!job->mask || job->mask[i]) compare_pixel(job, i, &sums);
         job->rows[y] = sums;
     }
+    es_fp_leave(environment);
 }
 
 static double ratio(const es_exact_sum* sum, uint64_t count) { return count ? es_sum_value(sum) / (double)count : 0; }
@@ -78,6 +80,37 @@ static void finish(const row_sums* rows, uint32_t count, es_image_error* error)
     error->rell1 = es_relative_to_mean(ratio(&all.absolute, all.samples), error->reference_mean);
 }
 
+static double mean_flip(const float* errors, uint32_t width, uint32_t height, const uint8_t* mask)
+{
+    double sum = 0;
+    uint64_t count = 0;
+    for (uint32_t y = 0; y < height; y++) {
+        double row = 0;
+        for (size_t i = (size_t)y * width; i < (size_t)(y + 1) * width; i++)
+            if (!mask || mask[i]) {
+                row += (double)errors[i];
+                count++;
+            }
+        sum += row;
+    }
+    return count ? sum / (double)count : 0;
+}
+
+static es_result add_flip(es_context* context, const es_image* a, const es_image* b, const es_channel_pairs* pairs, const es_error_desc* desc, es_image_error* error)
+{
+    const size_t pixels = (size_t)a->width * a->height;
+    float* errors = es_allocate_array(context, pixels, sizeof *errors);
+    if (!errors) return es_context_last_result(context);
+    es_result result = es_flip(context, a, b, pairs, false, desc, errors);
+    if (!result) error->flip = mean_flip(errors, a->width, a->height, desc->mask);
+    if (!result && !desc->display_referred) {
+        result = es_flip(context, a, b, pairs, true, desc, errors);
+        if (!result) error->hdr_flip = mean_flip(errors, a->width, a->height, desc->mask);
+    }
+    es_release(context, errors, pixels * sizeof *errors);
+    return result;
+}
+
 es_result es_image_compare(es_context* context, const es_image* a, const es_image* b, const es_error_desc* desc, es_image_error* error)
 {
     static const es_error_desc everything = {.flip = true};
@@ -89,11 +122,12 @@ es_result es_image_compare(es_context* context, const es_image* a, const es_imag
     if (result) return result;
     row_sums* rows = es_allocate_array(context, a->height, sizeof *rows);
     if (!rows) return es_context_last_result(context);
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped();
     compare_job job = {a, b, &pairs, desc->mask, rows};
     es_parallel_for(context, a->height, 8, compare_rows, &job);
     finish(rows, a->height, error);
-    es_fp_leave(environment);
     es_release(context, rows, a->height * sizeof *rows);
-    return ES_OK;
+    if (desc->flip && pairs.has_colour) result = add_flip(context, a, b, &pairs, desc, error);
+    es_fp_leave(environment);
+    return result;
 }

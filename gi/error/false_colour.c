@@ -36,7 +36,7 @@ es_result es_image_false_colour(es_context* context, const es_image* values, flo
         return es_misuse(context, ES_INVALID_ARGUMENT, "es_image_false_colour: the scale is %g; a finite number above 0 is accepted", (double)scale);
     es_result code = es_image_create(context, values->width, values->height, 3, result);
     if (code) return code;
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped();
     for (size_t i = 0; i < (size_t)values->width * values->height; i++) {
         float *rgb = result->pixels + 3 * i, t = values->pixels[i] / scale;
         if (es_is_nan(t)) {

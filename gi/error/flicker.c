@@ -38,6 +38,7 @@ static void add_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
     const frame_job* job = user;
     es_flicker* f = job->flicker;
     (void)worker;
+    es_fp_environment environment = es_fp_enter_untrapped();
     for (uint32_t y = begin; y < end; y++) {
         row_sums sums = {0};
         for (size_t i = (size_t)y * f->width; i < (size_t)(y + 1) * f->width; i++)
@@ -58,6 +59,7 @@ static void add_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
             }
         f->rows[y] = sums;
     }
+    es_fp_leave(environment);
 }
 
 static void add_sum(es_exact_sum* to, const es_exact_sum* sum)
@@ -122,7 +124,7 @@ es_result es_flicker_add(es_flicker* flicker, const es_image* a, const es_image*
     if (a->width != f->width || a->height != f->height || pairs.count != f->channels)
         return es_fail(f->context, ES_INVALID_ARGUMENT, "frame %llu is %u x %u with %u channels to compare, those before it are %u x %u with %u",
             (unsigned long long)f->frames, a->width, a->height, pairs.count, f->width, f->height, f->channels);
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped();
     frame_job job = {f, a, b, &pairs};
     es_parallel_for(f->context, f->height, 8, add_rows, &job);
     row_sums frame = {0};
@@ -154,7 +156,7 @@ es_flicker_error es_flicker_result(const es_flicker* flicker)
     const es_flicker* f = flicker;
     error.frames = f->frames;
     if (f->frames < 2) return error;
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped();
     double values = (double)f->width * f->height * f->channels * (double)(f->frames - 1);
     double mean = f->total.finite ? es_sum_value(&f->total.reference) / (double)f->total.finite : 0;
     error.flicker = es_relative_to_mean(__builtin_sqrt(es_sum_value(&f->total.error) / values), mean);
