@@ -25,9 +25,9 @@ bool demo_parse_double(const char* text, double minimum, double maximum, double*
     return true;
 }
 
-static const char* const method_names[] = {"none", "ism", "classic"};
+static const char* const method_names[] = {"none", "ism", "classic", "vpl-traced"};
 
-const char* demo_method_name(uint32_t method) { return method < 3 ? method_names[method] : "?"; }
+const char* demo_method_name(uint32_t method) { return method < 4 ? method_names[method] : "?"; }
 
 static int parse_size(const char* text, demo_options* options)
 {
@@ -78,12 +78,12 @@ static int parse_isa(const char* text, demo_options* options)
 
 static int parse_method(const char* text, demo_options* options)
 {
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 4; i++)
         if (!strcmp(text, method_names[i])) {
             options->method = i;
             return DEMO_OK;
         }
-    return demo_refuse("--gi %s: none, ism or classic is expected", text);
+    return demo_refuse("--gi %s: none, ism, classic or vpl-traced is expected", text);
 }
 
 enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };

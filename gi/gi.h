@@ -17,8 +17,16 @@ extern "C" {
 typedef enum es_gi_method {
     ES_GI_NONE,     /* direct light only */
     ES_GI_ISM,      /* virtual point lights, imperfect shadow maps (Ritschel thesis §5.2) */
-    ES_GI_CLASSIC   /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
+    ES_GI_CLASSIC,  /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
+    ES_GI_VPL_TRACED /* the same lights, visibility by rays, every light at every pixel: a judge; slower */
 } es_gi_method;
+
+/* What ES_GI_VPL_TRACED makes of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
+typedef enum es_traced_bias {
+    ES_TRACED_BOUNDED,      /* as the real-time methods have them */
+    ES_TRACED_UNBOUNDED,    /* none of them: right on average, spots of any brightness near the lights */
+    ES_TRACED_COMPENSATED   /* all of them, and what they leave out found by rays (Kollig and Keller 2004): right on average, without spots */
+} es_traced_bias;
 
 typedef enum es_tone_map { ES_TONE_MAP_REINHARD, ES_TONE_MAP_PBR_NEUTRAL, ES_TONE_MAP_LINEAR } es_tone_map;
 
@@ -52,6 +60,9 @@ typedef struct es_renderer_settings {
     float ism_bias;                  /* share of the scene's extent */
     float ism_slope_bias;            /* share of the scene's extent, over the cosine at the pixel; about the width of a splat */
     uint32_t classic_size;           /* texels of a classic map's side */
+    /* traced visibility */
+    uint32_t traced_bias;            /* es_traced_bias */
+    uint32_t traced_samples;         /* COMPENSATED: rays per pixel */
     /* interleaved shading and filter */
     uint32_t interleave;             /* n of the n × n pattern, 1 … 16 */
     uint32_t filter_passes;          /* 0: none; 1: a box, in which single bright pixels leave n × n blocks; 2: a tent, which is smooth */

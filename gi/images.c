@@ -8,7 +8,7 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM
 } image_kind;
@@ -20,6 +20,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
     {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
+    {IMAGE_COMPENSATION, "compensation", "of the indirect light, what vpl-traced finds by rays, W/(m² sr), of either sign"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
     {IMAGE_NORMAL, "normal", "world shading normal"},
     {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},
@@ -224,9 +225,10 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_INDIRECT:
     case IMAGE_INDIRECT_UNFILTERED: result = put_composed(renderer, kind, image); break;
     case IMAGE_DIRECT:
-    case IMAGE_IRRADIANCE: {
+    case IMAGE_IRRADIANCE:
+    case IMAGE_COMPENSATION: {
         es_compose_job job = es_renderer_compose_job(renderer);
-        const float* const* planes = kind == IMAGE_DIRECT ? job.direct : job.irradiance;
+        const float* const* planes = kind == IMAGE_DIRECT ? job.direct : kind == IMAGE_IRRADIANCE ? job.irradiance : job.compensation;
         if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }

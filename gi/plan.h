@@ -16,8 +16,10 @@
     X(POINTS, "points", "points")                                                                                \
     X(ISM, "imperfect shadow maps", "points")                                                                    \
     X(CLASSIC, "classic shadow maps", "maps")                                                                    \
+    X(HIERARCHY, "ray hierarchy", "triangles")                                                                   \
     X(DIRECT, "direct", "lights")                                                                                \
     X(SHADING, "shading", "samples")                                                                             \
+    X(COMPENSATION, "bias compensation", "samples")                                                              \
     X(FILTER, "filter", "pixels")                                                                                \
     X(COMPOSE, "compose", "pixels")
 

@@ -6,11 +6,14 @@
 #include "gi/classic.h"
 #include "gi/direct.h"
 #include "gi/surface.h"
+#include "gi/vpl_visibility.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/settings.h"
 
 /* ---- planes ------------------------------------------------------------------------------------------------------------ */
+
+float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inputs* in) { return settings->geometry_bound / (in->extent * in->extent); }
 
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer)
 {
@@ -77,6 +80,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->direct);
     es_planes_free(context, &renderer->irradiance);
     es_planes_free(context, &renderer->specular);
+    es_planes_free(context, &renderer->compensation);
     for (int i = 0; i < 2; i++) {
         es_planes_free(context, &renderer->filtered_irradiance[i]);
         es_planes_free(context, &renderer->filtered_specular[i]);
@@ -97,6 +101,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
     es_scene_points_free(context, &renderer->points);
     es_ism_maps_free(context, &renderer->maps);
+    es_trace_scene_free(&renderer->trace_scene);
     es_arena_free(&renderer->arena);
     if (renderer->rasterizer) es_rasterizer_destroy(renderer->rasterizer);
     es_release(context, renderer, sizeof *renderer);
@@ -163,17 +168,6 @@ static es_result reserve_vpls(es_renderer* renderer, uint32_t count)
 
 /* ---- what the frame is made from -------------------------------------------------------------------------------------------- */
 
-typedef struct frame_inputs {
-    const es_draw_list* list;
-    const es_light_state* lights;
-    uint32_t light_count;
-    es_world_revisions revisions;
-    es_vec3 bounds_min, bounds_max;
-    float extent;            /* diagonal of the world's bounds, metres */
-    bool has_geometry;
-    const char* no_indirect; /* why there is no indirect light; NULL: there is */
-} frame_inputs;
-
 /* Textures may make any roughness of it. */
 static bool material_has_lobe(const es_material_desc* m)
 {
@@ -192,7 +186,7 @@ static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* lis
 
 /* ---- passes -------------------------------------------------------------------------------------------------------------------- */
 
-static es_result pass_visibility(es_renderer* r, const frame_inputs* in)
+static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan_begin(&r->plan, ES_PASS_VISIBILITY);
     es_plan_reads(&r->plan, &r->view, sizeof r->view);
@@ -208,7 +202,7 @@ static es_result pass_visibility(es_renderer* r, const frame_inputs* in)
 }
 
 /* The light's pose without its colour: what its views depend on. */
-static void reads_light_poses(es_plan* plan, const frame_inputs* in)
+static void reads_light_poses(es_plan* plan, const es_frame_inputs* in)
 {
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
@@ -219,7 +213,7 @@ static void reads_light_poses(es_plan* plan, const frame_inputs* in)
     }
 }
 
-static es_result pass_light_views(es_renderer* r, const frame_inputs* in)
+static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     r->light_count = in->light_count;
@@ -269,7 +263,7 @@ static es_result pass_light_views(es_renderer* r, const frame_inputs* in)
     return result;
 }
 
-static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
+static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     if (in->no_indirect) {
@@ -303,9 +297,9 @@ static es_result pass_vpls(es_renderer* r, const frame_inputs* in)
 
 /* What is closer to a light than this is its own surface: the position comes from a texel's centre and the normal is interpolated, so
  * neighbouring triangles may rise a little above its horizon. */
-static float near_distance(const frame_inputs* in) { return in->extent * 2e-3f; }
+static float near_distance(const es_frame_inputs* in) { return in->extent * 2e-3f; }
 
-static es_result draw_classic_maps(es_renderer* r, const frame_inputs* in)
+static es_result draw_classic_maps(es_renderer* r, const es_frame_inputs* in)
 {
     uint32_t size = r->settings.classic_size;
     size_t scratch_floats = es_classic_scratch_floats(size);
@@ -325,7 +319,7 @@ static uint32_t subset_count(const es_renderer_settings* s)
     return count < 1 ? 1 : count > most ? most : count;
 }
 
-static es_result pass_maps(es_renderer* r, const frame_inputs* in)
+static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
@@ -336,7 +330,7 @@ static es_result pass_maps(es_renderer* r, const frame_inputs* in)
         es_plan_not_needed(plan, ES_PASS_ISM, why);
     }
     if (none || s->method != ES_GI_CLASSIC) es_plan_not_needed(plan, ES_PASS_CLASSIC, none ? none : "gi is not classic");
-    if (none) return ES_OK;
+    if (none || s->method == ES_GI_VPL_TRACED) return ES_OK;
 
     if (s->method == ES_GI_CLASSIC) {
         es_plan_begin(plan, ES_PASS_CLASSIC);
@@ -374,7 +368,7 @@ static es_result pass_maps(es_renderer* r, const frame_inputs* in)
     return result;
 }
 
-static es_result pass_direct(es_renderer* r, const frame_inputs* in)
+static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     if (!r->light_count) {
@@ -397,7 +391,10 @@ static es_result pass_direct(es_renderer* r, const frame_inputs* in)
     return ES_OK;
 }
 
-static es_result pass_shading(es_renderer* r, const frame_inputs* in)
+/* 1/m², in place of the bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
+#define UNBOUNDED 1e18f
+
+static es_result pass_shading(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
@@ -411,29 +408,42 @@ static es_result pass_shading(es_renderer* r, const frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VPLS);
     es_plan_reads_pass(plan, ES_PASS_ISM);
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)s->interleave, in->extent, r->has_specular};
+    es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
+    const bool traced = s->method == ES_GI_VPL_TRACED, unbounded = traced && s->traced_bias == ES_TRACED_UNBOUNDED;
+    const uint32_t interleave = traced ? 1 : s->interleave;
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = es_planes_resize(r->context, &r->irradiance, &r->gbuffer);
     if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, &r->gbuffer);
     if (result) return result;
     es_shade_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
-        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = s->geometry_bound / (in->extent * in->extent), .interleave = s->interleave};
+        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = es_geometry_bound(s, in), .interleave = interleave};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = r->irradiance.at[k];
         job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;
     }
     es_arena_reset(&r->arena);
-    result = es_shade(r->context, &r->arena, &job);
-    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->vpl_count / (s->interleave * s->interleave));
+    es_vpl_visibility visibility;
+    if (traced) {
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, r->vpls, r->vpl_count, in->extent, &visibility);
+        job.visibility = &visibility.shade;
+        job.maps = NULL;
+    }
+    if (unbounded) {
+        job.geometry_bound = UNBOUNDED;
+        job.spread = job.lobe_roughness = 0.0f;
+    }
+    if (!result) result = es_shade(r->context, &r->arena, &job);
+    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->vpl_count / (interleave * interleave));
     return result;
 }
 
-static es_result pass_filter(es_renderer* r, const frame_inputs* in)
+static es_result pass_filter(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : s->method == ES_GI_VPL_TRACED ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
     r->filter_passes = why ? 0 : s->filter_passes;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_FILTER, why);
@@ -478,6 +488,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];
         if (r->plan.valid[ES_PASS_SHADING] && r->has_specular) job.specular[k] = specular->at[k];
+        if (r->plan.valid[ES_PASS_COMPENSATION]) job.compensation[k] = r->compensation.at[k];
     }
     return job;
 }
@@ -491,6 +502,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_COMPOSE)) return;
@@ -512,7 +524,7 @@ static es_result render(es_renderer* r, es_world* world)
     if (result) return result;
     r->rays = es_pixel_rays_of_view(&r->view);
 
-    frame_inputs in = {.list = es_world_draw_list(world), .revisions = es_world_get_revisions(world)};
+    es_frame_inputs in = {.list = es_world_draw_list(world), .revisions = es_world_get_revisions(world)};
     size_t light_count;
     in.lights = es_world_lights(world, &light_count);
     in.light_count = (uint32_t)light_count;
@@ -526,8 +538,10 @@ static es_result render(es_renderer* r, es_world* world)
     if (!result) result = pass_light_views(r, &in);
     if (!result) result = pass_vpls(r, &in);
     if (!result) result = pass_maps(r, &in);
+    if (!result) result = es_pass_hierarchy(r, &in, world);
     if (!result) result = pass_direct(r, &in);
     if (!result) result = pass_shading(r, &in);
+    if (!result) result = es_pass_compensation(r, &in);
     if (!result) result = pass_filter(r, &in);
     if (!result) pass_compose(r);
     return result;

@@ -7,6 +7,7 @@
 #include "gi/ism.h"
 #include "gi/light_view.h"
 #include "gi/plan.h"
+#include "gi/reference/scene.h"
 #include "gi/scene_points.h"
 #include "gi/shade.h"
 #include "gi/vpl_sampling.h"
@@ -38,9 +39,12 @@ struct es_renderer {
     es_scene_points points;
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */
 
+    es_trace_scene trace_scene; /* of traced methods */
+
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance[2]; /* two to go back and forth between */
     es_planes specular, filtered_specular[2];     /* used when something in the frame has a lobe */
+    es_planes compensation;    /* of the lights' bias: reflected radiance, of either sign */
     bool has_specular;
     uint32_t filter_passes;    /* that this frame's indirect light went through */
     es_arena arena;            /* of the pass that runs */
@@ -48,8 +52,25 @@ struct es_renderer {
     es_srgb_table srgb;
 };
 
+/* What a frame is made from, and why some of it is not. */
+typedef struct es_frame_inputs {
+    const es_draw_list* list;
+    const es_light_state* lights;
+    uint32_t light_count;
+    es_world_revisions revisions;
+    es_vec3 bounds_min, bounds_max;
+    float extent;            /* diagonal of the world's bounds, metres */
+    bool has_geometry;
+    const char* no_indirect; /* why there is no indirect light; NULL: there is */
+} es_frame_inputs;
+
+/* es_renderer_settings.geometry_bound of this world, 1/m² */
+float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inputs* in);
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer);
 void es_planes_free(es_context* context, es_planes* planes);
+/* Passes of traced methods (gi/traced_passes.c). */
+es_result es_pass_hierarchy(es_renderer* renderer, const es_frame_inputs* in, es_world* world);
+es_result es_pass_compensation(es_renderer* renderer, const es_frame_inputs* in);
 /* The job of the compose pass for the frame as it stands; outputs are for the caller to set. */
 es_compose_job es_renderer_compose_job(const es_renderer* renderer);
 

@@ -7,7 +7,7 @@
 static const es_setting renderer_table[] = {
     {"width", ES_SETTING_INT, "1024", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(width)},
     {"height", ES_SETTING_INT, "768", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(height)},
-    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic", "indirect light: none, imperfect shadow maps, or an accurate map per light", AT(method)},
+    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic|vpl-traced", "indirect light: none, imperfect shadow maps, an accurate map per light, or rays to every light", AT(method)},
     {"skip", ES_SETTING_BOOL, "true", 0, 1, NULL, "skip work whose result would be the same bits", AT(skip)},
     {"bounces", ES_SETTING_INT, "1", 0, 1, NULL, "indirect bounces", AT(bounces)},
 
@@ -35,6 +35,10 @@ static const es_setting renderer_table[] = {
     {"ism.bias", ES_SETTING_FLOAT, "0", 0, 1, NULL, "depth bias of the visibility test, share of the scene's extent", AT(ism_bias)},
     {"ism.slope-bias", ES_SETTING_FLOAT, "0.026", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(ism_slope_bias)},
     {"classic.size", ES_SETTING_INT, "256", 32, 1024, NULL, "texels of a classic map's side, a power of two", AT(classic_size)},
+
+    {"traced.bias", ES_SETTING_CHOICE, "bounded", 0, 0, "bounded|unbounded|compensated",
+        "vpl-traced: vpl.bound, vpl.spread and vpl.roughness apply, or do not, or do and rays find what they leave out", AT(traced_bias)},
+    {"traced.samples", ES_SETTING_INT, "16", 1, 65536, NULL, "vpl-traced, compensated: rays per pixel", AT(traced_samples)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
     {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent", AT(filter_passes)},

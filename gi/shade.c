@@ -40,10 +40,21 @@ static float widest_exponent(float roughness)
     return 2.0f / es_maxf(alpha * alpha, 1e-6f) - 2.0f;
 }
 
+static float widened(uint32_t model, float roughness, float lobe_roughness)
+{
+    return model == ES_SURFACE_PHONG ? es_minf(roughness, es_maxf(widest_exponent(lobe_roughness), 1.0f)) : es_maxf(roughness, lobe_roughness);
+}
+
+es_surface es_widened_lobe(es_surface surface, float lobe_roughness)
+{
+    surface.roughness = widened(surface.model, surface.roughness, lobe_roughness);
+    return surface;
+}
+
 static es_shade_light light_of(const es_vpl_record* vpl, float scale, float spread, float lobe_roughness)
 {
     es_shade_light light = {.spread = vpl->area * (0.318309886f * spread), .model = vpl->model, .glossy = vpl->glossy};
-    light.roughness = vpl->model == ES_SURFACE_PHONG ? es_minf(vpl->roughness, es_maxf(widest_exponent(lobe_roughness), 1.0f)) : es_maxf(vpl->roughness, lobe_roughness);
+    light.roughness = widened(vpl->model, vpl->roughness, lobe_roughness);
     memcpy(light.position, vpl->position, sizeof light.position);
     memcpy(light.normal, vpl->normal, sizeof light.normal);
     memcpy(light.tangent, vpl->tangent, sizeof light.tangent);

@@ -21,17 +21,29 @@
 #define EARTHSHINE_GI_SHADE_H
 
 #include "gi/pixel_rays.h"
+#include "gi/surface.h"
 #include "gi/vpl.h"
 #include "platform/context.h"
 
 enum { ES_INTERLEAVE_MAX = 16 };
 
+typedef struct es_shade_batch es_shade_batch;
+typedef struct es_shade_visibility es_shade_visibility;
+
+/* Visibility found by the caller: `test` sets batch->visible, all bits or none, of those of the first `lanes` pixels that the light's front
+ * and their own face; others are not looked at. Called by several workers at once. */
+struct es_shade_visibility {
+    void (*test)(const es_shade_visibility* visibility, uint32_t vpl, es_shade_batch* batch, uint32_t lanes);
+    float offset;                  /* metres from a pixel's surface at which its rays begin, besides 2^-17 of its largest coordinate */
+};
+
 typedef struct es_shade_job {
-    const es_gbuffer* gbuffer;     /* depth and normal; with `specular` also albedo and surface */
+    const es_gbuffer* gbuffer;     /* depth and normal; with `specular` also albedo and surface; with `visibility` the geometric normal */
     es_pixel_rays rays;
     const es_vpl_record* vpls;
     uint32_t vpl_count;
     const uint16_t* maps;          /* map v at maps + v · map_size²; NULL: everything sees everything */
+    const es_shade_visibility* visibility; /* in place of maps; NULL: by the maps */
     uint32_t map_size;
     float far_distance;            /* of the maps */
     float bias, slope_bias;        /* metres */
@@ -45,6 +57,9 @@ typedef struct es_shade_job {
 } es_shade_job;
 
 es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job);
+
+/* The surface with its lobe widened to `lobe_roughness`, as a light's surface and a pixel's are before shading. */
+es_surface es_widened_lobe(es_surface surface, float lobe_roughness);
 
 /* ---- between shade.c and its kernel -------------------------------------------------------------------------------------- */
 
@@ -62,7 +77,7 @@ typedef struct es_shade_light {
  * and two maps fit the second-level cache. Rows of up to ES_SHADE_COLUMNS lanes, a multiple of eight. */
 enum { ES_SHADE_LANES = 4096, ES_SHADE_COLUMNS = 128 };
 
-typedef struct es_shade_batch {
+struct es_shade_batch {
     float px[ES_SHADE_LANES], py[ES_SHADE_LANES], pz[ES_SHADE_LANES];
     float nx[ES_SHADE_LANES], ny[ES_SHADE_LANES], nz[ES_SHADE_LANES]; /* 0 where nothing is seen */
     float e[3][ES_SHADE_LANES];
@@ -72,7 +87,10 @@ typedef struct es_shade_batch {
     int32_t model[ES_SHADE_LANES];
     uint8_t lobed[ES_SHADE_LANES / 8];  /* per vector: does a pixel of it have a lobe? */
     float s[3][ES_SHADE_LANES];
-} es_shade_batch;
+    /* with es_shade_visibility */
+    float ox[ES_SHADE_LANES], oy[ES_SHADE_LANES], oz[ES_SHADE_LANES]; /* where rays begin */
+    int32_t visible[ES_SHADE_LANES];
+};
 
 /* A block: columns [column, column + ES_SHADE_COLUMNS) and rows [row, row + rows) of each phase of phase row phase_y. */
 typedef struct es_shade_block { uint32_t phase_y, column, row, rows; } es_shade_block;

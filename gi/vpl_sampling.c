@@ -303,6 +303,49 @@ static void share_out(const es_light_view* views, uint32_t view_count, uint32_t 
         else given--;
 }
 
+static float total_importance(const es_importance* importance)
+{
+    float total = 0.0f;
+    for (uint32_t f = 0; f < importance->face_count; f++) total += importance->sums[f * importance->face_floats + importance->level_offset[importance->level_count - 1]];
+    return total;
+}
+
+void es_vpl_shares(const es_light_view* views, uint32_t view_count, const es_importance* importances, uint32_t count, uint32_t* shares)
+{
+    share_out(views, view_count, count, shares);
+    for (uint32_t i = 0; i < view_count; i++)
+        if (!(total_importance(&importances[i]) > 0.0f)) shares[i] = 0; /* lights nothing */
+}
+
+/* Pixel coordinates and depth of a point; false when it lies outside the face. */
+static bool texel_of(const es_light_view* view, const es_light_face* face, es_vec3 position, uint32_t* x, uint32_t* y, float* depth)
+{
+    const es_pixel_rays* r = &face->gbuffer_rays;
+    es_vec3 v = es_v3_sub(position, es_v3(r->base[0], r->base[1], r->base[2])), d = es_v3(r->dir[0], r->dir[1], r->dir[2]);
+    const float *sx = view->orthographic ? r->base_dx : r->dir_dx, *sy = view->orthographic ? r->base_dy : r->dir_dy;
+    es_vec3 dx = es_v3(sx[0], sx[1], sx[2]), dy = es_v3(sy[0], sy[1], sy[2]), forward = es_v3_normalize(es_v3_cross(dx, dy), d);
+    *depth = es_v3_dot(v, forward) / es_v3_dot(d, forward);
+    if (!(*depth > 0.0f)) return false;
+    /* orthographic: v - depth · d lies in the plane of dx and dy; perspective: v / depth - d does */
+    es_vec3 q = view->orthographic ? es_v3_sub(v, es_v3_scale(d, *depth)) : es_v3_sub(es_v3_scale(v, 1.0f / *depth), d);
+    float u = es_v3_dot(q, dx) / es_v3_dot(dx, dx) + 0.5f, w = es_v3_dot(q, dy) / es_v3_dot(dy, dy) + 0.5f;
+    float size = (float)face->gbuffer.width;
+    if (!(u >= 0.0f && u < size && w >= 0.0f && w < size)) return false;
+    *x = (uint32_t)u;
+    *y = (uint32_t)w;
+    return true;
+}
+
+float es_vpl_area_at(const es_light_view* view, const es_importance* importance, uint32_t share, es_vec3 position, es_vec3 normal)
+{
+    uint32_t f = 0, x = 0, y = 0;
+    float depth = 0.0f, total = total_importance(importance);
+    while (f < view->face_count && !texel_of(view, &view->faces[f], position, &x, &y, &depth)) f++;
+    if (f == view->face_count || !share || !(total > 0.0f)) return __builtin_inff();
+    float probability = importance->sums[f * importance->face_floats + (size_t)y * importance->size + x] / total;
+    return probability > 1e-20f ? texel_area(view, &view->faces[f], x, y, depth, normal) / (probability * (float)share) : __builtin_inff();
+}
+
 es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32_t view_count, const es_importance* importances, const es_vpl_request* request,
     es_vpl_record* records, uint32_t* count)
 {
@@ -318,14 +361,10 @@ es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32
         if (next) es_release(context, next, view_count * sizeof *next);
         return es_context_last_result(context);
     }
-    share_out(views, view_count, request->count, shares);
+    es_vpl_shares(views, view_count, importances, request->count, shares);
     uint32_t drawn = 0;
     for (uint32_t i = 0; i < view_count; i++) {
         next[i] = 0;
-        float total = 0.0f;
-        for (uint32_t f = 0; f < importances[i].face_count; f++)
-            total += importances[i].sums[f * importances[i].face_floats + importances[i].level_offset[importances[i].level_count - 1]];
-        if (!(total > 0.0f)) shares[i] = 0; /* lights nothing */
         drawn += shares[i];
     }
 

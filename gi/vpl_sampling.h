@@ -22,6 +22,12 @@ void es_importance_free(es_context* context, es_importance* importance);
  * the probability of that texel. False when all importance is zero. */
 bool es_importance_warp(const es_importance* importance, float u, float v, uint32_t* face, uint32_t* x, uint32_t* y, float* probability);
 
+/* How many of `count` lights each view gets: by emitted power, none where its importance is zero. */
+void es_vpl_shares(const es_light_view* views, uint32_t view_count, const es_importance* importances, uint32_t count, uint32_t* shares);
+
+/* es_vpl_record.area of a light at that place of a surface, if it were one of `share` of this view; infinite where there can be none. */
+float es_vpl_area_at(const es_light_view* view, const es_importance* importance, uint32_t share, es_vec3 position, es_vec3 normal);
+
 typedef struct es_vpl_request {
     uint32_t count;       /* over all lights, shared out by emitted power */
     uint32_t seed;        /* offset into the Halton sequence */

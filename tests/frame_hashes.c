@@ -6,7 +6,8 @@
  * those lack: point and directional light, textures, alpha mask, mirrored instances, Phong and unlit surfaces, a deformed mesh.
  *
  * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
- * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps.
+ * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps;
+ * `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
  *        frame_hashes --isas
@@ -341,6 +342,17 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     settings.vpls = 16;
     check(context, es_renderer_configure(renderer, &settings), "changing the method");
     print_images(context, renderer, world, p->name, "classic", folder);
+    settings.method = ES_GI_VPL_TRACED;
+    check(context, es_renderer_configure(renderer, &settings), "changing the method");
+    print_images(context, renderer, world, p->name, "traced", folder);
+    settings.traced_bias = ES_TRACED_UNBOUNDED;
+    check(context, es_renderer_configure(renderer, &settings), "leaving out the bound");
+    print_images(context, renderer, world, p->name, "unbounded", folder);
+    settings.traced_bias = ES_TRACED_COMPENSATED;
+    settings.traced_samples = 2;
+    check(context, es_renderer_configure(renderer, &settings), "compensating");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "compensated", folder);
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);

@@ -121,6 +121,7 @@ static void bounce(uint32_t method, bool view_importance)
 }
 static void test_classic(void** state) { bounce(ES_GI_CLASSIC, false); }
 static void test_ism(void** state) { bounce(ES_GI_ISM, false); }
+static void test_vpl_traced(void** state) { bounce(ES_GI_VPL_TRACED, false); }
 static void test_view_importance(void** state) { bounce(ES_GI_ISM, true); }
 
 /* A light of area a softened by spread: d² becomes d² + spread a / pi. In the sphere d² is spread evenly over 0 … 4R², so that
@@ -189,6 +190,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_classic),
         cmocka_unit_test(test_ism),
+        cmocka_unit_test(test_vpl_traced),
         cmocka_unit_test(test_view_importance),
         cmocka_unit_test(test_spread),
         cmocka_unit_test(test_direct),

@@ -74,6 +74,11 @@ void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uin
                 indirect.g = indirect.g + vf_load(job->specular[1] + at);
                 indirect.b = indirect.b + vf_load(job->specular[2] + at);
             }
+            if (job->compensation[0]) {
+                indirect.r = indirect.r + vf_load(job->compensation[0] + at);
+                indirect.g = indirect.g + vf_load(job->compensation[1] + at);
+                indirect.b = indirect.b + vf_load(job->compensation[2] + at);
+            }
             indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
             c.r = c.r + indirect.r;
             c.g = c.g + indirect.g;

@@ -17,6 +17,16 @@
 
 typedef struct lanes_of_phase { uint32_t x0, columns, lanes, y0, rows; } lanes_of_phase; /* lanes: columns rounded up to VW */
 
+static void ray_origins(const uint32_t* geometric_normals, vi x, const vf p[3], float offset, es_shade_batch* batch, uint32_t at)
+{
+    vf nx, ny, nz;
+    es_unpack_normal_v(vi_gather(geometric_normals, x), &nx, &ny, &nz);
+    vf step = vf_max(vf_abs(p[0]), vf_max(vf_abs(p[1]), vf_abs(p[2]))) * vf_set1(7.6293945e-6f) + vf_set1(offset);
+    vf_store(batch->ox + at, p[0] + step * nx);
+    vf_store(batch->oy + at, p[1] + step * ny);
+    vf_store(batch->oz + at, p[2] + step * nz);
+}
+
 static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool with_lobes, bool* any_lobe)
 {
     const es_gbuffer* g = job->gbuffer;
@@ -55,6 +65,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             vf_store(batch->ny + at, vf_and(seen, ny));
             vf_store(batch->nz + at, vf_and(seen, nz));
             for (int k = 0; k < 3; k++) vf_store(batch->e[k] + at, zero);
+            if (job->visibility) ray_origins(g->geometric_normal + row, x, q, job->visibility->offset, batch, at);
             if (!with_lobes) continue;
             vf v[3];
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
@@ -81,8 +92,10 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
     *any_lobe = vm_any(lobes);
 }
 
+enum shadow { NO_SHADOW, SHADOW_BY_MAP, SHADOW_BY_RAYS };
+
 /* The three switches are constants at every call. */
-VINL void apply_light(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, bool shadowed, bool glossy_light, bool lobes)
+VINL void apply_light(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, enum shadow shadow, bool glossy_light, bool lobes)
 {
     const vf zero = vf_zero(), one = vf_set1(1.0f);
     const vf ox = vf_set1(light->position[0]), oy = vf_set1(light->position[1]), oz = vf_set1(light->position[2]);
@@ -101,10 +114,11 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
         vf qz = dx * nx + dy * ny + dz * nz;
         vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i); /* times -r */
         vm lit = vm_gt(qz, zero) & vm_lt(pixel_cos, zero);
+        if (shadow == SHADOW_BY_RAYS) lit &= vi_load(batch->visible + i);
         if (!vm_any(lit)) continue;
         vf r2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(NEAREST2));
         vf r = vf_sqrt(r2);
-        if (shadowed) {
+        if (shadow == SHADOW_BY_MAP) {
             vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz;
             /* |u|, |v| <= 1 up to rounding; what lies behind the light reads a texel of this side */
             vf s = half / (r + vf_max(qz, zero));
@@ -215,6 +229,15 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
     }
 }
 
+static void apply_traced(const es_shade_job* job, const es_shade_light* light, uint32_t vpl, es_shade_batch* batch, uint32_t lanes, bool lobes)
+{
+    job->visibility->test(job->visibility, vpl, batch, lanes);
+    if (lobes && light->glossy) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true, true);
+    else if (lobes) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false, true);
+    else if (light->glossy) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true, false);
+    else apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false, false);
+}
+
 static void scatter(const es_gbuffer* g, const lanes_of_phase* p, uint32_t n, float (*from)[ES_SHADE_LANES], float* const to[3])
 {
     for (uint32_t j = 0; j < p->rows; j++) {
@@ -236,9 +259,11 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
     for (uint32_t v = phase; v < job->vpl_count; v += n * n) {
         const es_shade_light* light = &lights[v];
         const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
-        if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, map != NULL, true, true);
-        else if (lobes) apply_light(job, light, map, batch, lanes, map != NULL, false, true);
-        else if (light->glossy) apply_light(job, light, map, batch, lanes, map != NULL, true, false);
+        const enum shadow shadow = map ? SHADOW_BY_MAP : NO_SHADOW;
+        if (job->visibility) apply_traced(job, light, v, batch, lanes, lobes);
+        else if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, true);
+        else if (lobes) apply_light(job, light, map, batch, lanes, shadow, false, true);
+        else if (light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, false);
         else if (map) apply_diffuse(job, light, map, v + n * n < job->vpl_count ? map + n * n * map_texels : map, batch, lanes, true);
         else apply_diffuse(job, light, NULL, NULL, batch, lanes, false);
     }

@@ -175,7 +175,7 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
         normal = map_normal(instance, m, &c, normal, texel);
     }
     s->normal = front ? normal : es_v3_scale(normal, -1.0f);
-    s->reflects = (front || m->double_sided) && m->model != ES_SURFACE_UNLIT;
+    s->reflects = m->model != ES_SURFACE_UNLIT;
     if (!front && !m->double_sided) s->emission = es_v3(0, 0, 0);
     s->surface = es_surface_of(m->model, s->base, metallic, roughness, specular);
     if (!quantised) return;
@@ -308,11 +308,13 @@ static es_result sum_environment(es_trace_scene* scene)
 es_result es_trace_scene_take(es_trace_scene* scene, es_world* world, bool emission)
 {
     es_context* context = es_world_context(world);
+    es_bvh* kept = scene->context == context ? scene->bvh : NULL;
+    if (kept) scene->bvh = NULL;
     es_trace_scene_free(scene);
-    *scene = (es_trace_scene){.context = context};
+    *scene = (es_trace_scene){.context = context, .bvh = kept};
     const es_draw_list* list = es_world_draw_list(world);
-    es_result result = es_bvh_create(context, &scene->bvh);
-    if (!result) result = es_bvh_build(scene->bvh, list);
+    es_result result = kept ? ES_OK : es_bvh_create(context, &scene->bvh);
+    if (!result) result = es_bvh_update(scene->bvh, list);
     if (!result) result = copy_array(context, list->instances, list->instance_count, sizeof *list->instances, (void**)&scene->instances);
     if (!result) scene->instance_count = list->instance_count;
     if (!result) result = copy_array(context, list->materials, list->material_count, sizeof *list->materials, (void**)&scene->materials);

@@ -25,7 +25,7 @@ typedef struct es_trace_scene {
     float* environment_columns;
 } es_trace_scene;
 
-/* The world must stay as it is while the scene is used. emission: whether glowing surfaces and the environment are gathered. */
+/* From nothing (all zero), or again: then the hierarchy is refit where that will do. The world must stay as it is while the scene is used. emission: whether glowing surfaces and the environment are gathered. */
 es_result es_trace_scene_take(es_trace_scene* scene, es_world* world, bool emission);
 void es_trace_scene_free(es_trace_scene* scene);
 
@@ -37,7 +37,7 @@ typedef struct es_trace_surface {
     es_vec3 base;                      /* colour */
     es_surface surface;
     uint32_t primitive;
-    bool reflects;                     /* not unlit, not the back of a single-sided surface */
+    bool reflects;                     /* not unlit; backs of single-sided surfaces reflect as their fronts, which is how a lamp sees them */
 } es_trace_surface;
 
 /* `quantised`: as the G-buffer would hold it. */
