@@ -22,6 +22,8 @@ static const es_vec3 plate_corner = {-0.8f, 0.9f, 0.6f}, plate_u = {1.4f, 0, 0},
 
 static void say_nothing(void* user, es_log_level level, es_result item, const char* message) {}
 
+#define EXTENT2 41.0f /* m², of the world below */
+
 /* A floor and two walls lit by a spot; with `plates` one that both sides of are seen and one that the lamp sees the back of. */
 static small_world corner(surfaces kind, bool plates, uint32_t threads, uint32_t isa_mask, size_t memory_cap)
 {
@@ -142,7 +144,7 @@ static void test_all_pairs(void** state)
     small_world w = corner(DIFFUSE, true, 2, 0, 0);
     es_renderer_settings s = settings_of(ES_TRACED_BOUNDED);
     s.spread = 0;
-    s.geometry_bound = 4;
+    s.geometry_bound = 4 * EXTENT2;
     es_renderer* renderer = create(w.context, &s);
     assert_int_equal(es_renderer_render(renderer, w.world), ES_OK);
     assert_string_equal(pass(renderer, "filter")->skipped, "gi is vpl-traced: every pixel has every light");
@@ -217,11 +219,11 @@ static void test_bounding_takes_away(void** state)
 {
     small_world w = corner(DIFFUSE, true, 2, 0, 0);
     es_renderer_settings s = settings_of(ES_TRACED_UNBOUNDED);
-    s.geometry_bound = 1;
+    s.geometry_bound = 1 * EXTENT2;
     es_image all = render(&w, &s, "indirect");
     s.traced_bias = ES_TRACED_BOUNDED;
     es_image bounded = render(&w, &s, "indirect");
-    s.geometry_bound = 1e6f;
+    s.geometry_bound = 1e8f;
     es_image spread = render(&w, &s, "indirect");
     s.spread = 0;
     es_image neither = render(&w, &s, "indirect");
@@ -307,7 +309,7 @@ static void check_bias(surfaces kind)
     for (int b = 0; b < BLOCKS; b++) tolerance[b] = sqrt(tolerance[b]);
 
     es_renderer_settings s = settings_of(ES_TRACED_COMPENSATED);
-    s.geometry_bound = 1;
+    s.geometry_bound = 1 * EXTENT2;
     double worst, all;
     deviation(&w, s, 32, expected, tolerance, &worst, &all);
     if (!(worst < 3.5 && fabs(all) < 2.5)) fail_msg("compensated: %.1f standard errors in one block, %+.1f in all", worst, all);
@@ -319,7 +321,7 @@ static void check_bias(surfaces kind)
     deviation(&w, s, 32, expected, tolerance, &worst, &all);
     if (!(worst < 3.5 && fabs(all) < 2.5)) fail_msg("unbounded: %.1f standard errors in one block, %+.1f in all", worst, all);
     s.traced_bias = ES_TRACED_BOUNDED;
-    s.geometry_bound = 1;
+    s.geometry_bound = 1 * EXTENT2;
     deviation(&w, s, 32, expected, tolerance, &worst, &all);
     if (!(worst > 8)) fail_msg("bounded: only %.1f standard errors", worst);
     es_image_destroy(w.context, &truth);
