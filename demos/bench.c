@@ -31,10 +31,17 @@ double bench_median(double* values, size_t count)
 typedef struct benchmark {
     const char* name;
     int (*run)(const bench_options*);
+    size_t (*rows)(bench_row* rows, size_t capacity); /* for --only; NULL: all rows or none */
     bool by_default;
 } benchmark;
-static const benchmark benchmarks[] = {{"speed", bench_speed, true}, {"frame", bench_frame, false}};
-enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0] };
+/* In the order of the page. */
+static const benchmark benchmarks[] = {
+    {"speed", bench_speed, bench_speed_rows, true},
+    {"frame", bench_frame, NULL, false},
+};
+enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0], MAX_ROWS = 256 };
+
+const char* bench_name(size_t index) { return index < BENCHMARKS ? benchmarks[index].name : NULL; }
 
 static const benchmark* find_benchmark(const char* name)
 {
@@ -45,13 +52,26 @@ static const benchmark* find_benchmark(const char* name)
 
 static int check_row_id(const char* id)
 {
-    bench_row rows[64];
-    size_t count = bench_speed_rows(rows, 64);
-    if (bench_find_row(rows, count, id)) return DEMO_OK;
-    const char* ids[64];
-    for (size_t i = 0; i < count; i++) ids[i] = rows[i].id;
+    static bench_row rows[MAX_ROWS];
+    const char* ids[MAX_ROWS];
+    size_t count = 0;
+    for (int i = 0; i < BENCHMARKS; i++)
+        if (benchmarks[i].rows) count += benchmarks[i].rows(rows + count, MAX_ROWS - count);
+    for (size_t i = 0; i < count; i++) {
+        if (!strcmp(rows[i].id, id)) return DEMO_OK;
+        ids[i] = rows[i].id;
+    }
     const char* nearest = demo_nearest(id, ids, count);
     return demo_refuse("--only %s: no such row%s%s", id, nearest ? "; did you mean " : "", nearest ? nearest : "");
+}
+
+static int refuse_name(const char* name)
+{
+    demo_text known = {0};
+    for (int i = 0; i < BENCHMARKS; i++) demo_text_add(&known, "%s, ", benchmarks[i].name);
+    int code = demo_refuse("bench: unknown benchmark %s; %sand all are known", name, known.bytes ? known.bytes : "");
+    demo_text_free(&known);
+    return code;
 }
 
 static int prepare_directory(const char* path)
@@ -59,58 +79,51 @@ static int prepare_directory(const char* path)
     if (mkdir(path, 0777) != 0 && errno != EEXIST)
         return demo_refuse("--out %s: no such directory, and none can be made: %s", path, strerror(errno));
     char probe[DEMO_PATH_SIZE];
-    snprintf(probe, sizeof probe, "%s/speed.json", path);
+    snprintf(probe, sizeof probe, "%s/index.html", path);
     return demo_check_writable(probe);
 }
 
 int demo_bench(int count, char** arguments)
 {
-    static const char* const known[] = {"--out", "--runs", "--threads", "--only", "--no-peer"};
+    enum { OUT, RUNS, THREADS, ONLY, NO_PEER, QUICK, OPTIONS };
+    static const char* const known[OPTIONS] = {"--out", "--runs", "--threads", "--only", "--no-peer", "--quick"};
     char program[DEMO_PATH_SIZE];
     ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
     program[length > 0 ? length : 0] = 0;
     bench_options options = {.runs = 5, .threads = 2, .program = program};
-    const benchmark* chosen[BENCHMARKS] = {0};
-    size_t chosen_count = 0;
+    bool chosen[BENCHMARKS] = {false}, any = false;
     for (int i = 0; i < count; i++) {
         const char* argument = arguments[i];
         if (argument[0] != '-') {
             const benchmark* found = find_benchmark(argument);
-            if (!found) return demo_refuse("bench: unknown benchmark %s; speed and frame are known", argument);
-            bool again = false;
-            for (size_t k = 0; k < chosen_count; k++) again |= chosen[k] == found;
-            if (!again) chosen[chosen_count++] = found;
+            if (!found && strcmp(argument, "all") != 0) return refuse_name(argument);
+            for (int k = 0; k < BENCHMARKS; k++) chosen[k] |= !found || found == &benchmarks[k];
+            any = true;
             continue;
         }
-        if (!strcmp(argument, "--no-peer")) {
-            options.no_peer = true;
-            continue;
+        int option = 0;
+        while (option < OPTIONS && strcmp(argument, known[option]) != 0) option++;
+        if (option == OPTIONS) {
+            const char* nearest = demo_nearest(argument, known, OPTIONS);
+            return demo_refuse("bench: unknown option %s; %s%s", argument, nearest ? "did you mean " : "--out, --runs, --threads, --only, --no-peer and --quick are known",
+                nearest ? nearest : "");
         }
-        bool is_known = false;
-        for (size_t k = 0; k < 4; k++) is_known |= !strcmp(argument, known[k]);
-        if (!is_known) {
-            const char* nearest = demo_nearest(argument, known, 5);
-            return demo_refuse("bench: unknown option %s; %s", argument,
-                nearest ? nearest : "--out, --runs, --threads, --only and --no-peer are known");
-        }
+        if (option == NO_PEER) options.no_peer = true;
+        if (option == QUICK) options.quick = true;
+        if (option == NO_PEER || option == QUICK) continue;
         if (++i == count) return demo_refuse("%s: a value must follow", argument);
-        if (!strcmp(argument, "--out"))
-            options.out = arguments[i];
-        else if (!strcmp(argument, "--runs") && !demo_parse_uint(arguments[i], 1, 50, &options.runs))
-            return demo_refuse("--runs %s: a number from 1 to 50 is expected", arguments[i]);
-        else if (!strcmp(argument, "--threads") && !demo_parse_uint(arguments[i], 1, 64, &options.threads))
+        if (option == OUT) options.out = arguments[i];
+        if (option == RUNS && !demo_parse_uint(arguments[i], 1, 50, &options.runs)) return demo_refuse("--runs %s: a number from 1 to 50 is expected", arguments[i]);
+        if (option == THREADS && !demo_parse_uint(arguments[i], 1, 64, &options.threads))
             return demo_refuse("--threads %s: a number from 1 to 64 is expected", arguments[i]);
-        else if (!strcmp(argument, "--only")) {
-            if (check_row_id(arguments[i]) != DEMO_OK) return DEMO_BAD_INPUT;
-            if (options.only_count == 32) return demo_refuse("--only: at most 32 rows");
-            options.only[options.only_count++] = arguments[i];
-        }
+        if (option != ONLY) continue;
+        if (check_row_id(arguments[i]) != DEMO_OK) return DEMO_BAD_INPUT;
+        if (options.only_count == 32) return demo_refuse("--only: at most 32 rows");
+        options.only[options.only_count++] = arguments[i];
     }
     if (options.out && prepare_directory(options.out) != DEMO_OK) return DEMO_BAD_INPUT;
-    if (!chosen_count)
-        for (int i = 0; i < BENCHMARKS; i++)
-            if (benchmarks[i].by_default) chosen[chosen_count++] = &benchmarks[i];
     int code = DEMO_OK;
-    for (size_t i = 0; i < chosen_count && code == DEMO_OK; i++) code = chosen[i]->run(&options);
+    for (int i = 0; i < BENCHMARKS && code == DEMO_OK; i++)
+        if (any ? chosen[i] : benchmarks[i].by_default) code = benchmarks[i].run(&options);
     return code;
 }

@@ -3,6 +3,7 @@
 #define EARTHSHINE_DEMO_BENCH_H
 
 #include "demo.h"
+#include "plot.h"
 
 typedef enum bench_judge {
     BENCH_NONE,           /* a figure without a target */
@@ -26,6 +27,7 @@ typedef struct bench_options {
     uint32_t runs;
     uint32_t threads;
     bool no_peer;
+    bool quick; /* fewer settings and repetitions: to see that it runs, not to quote */
     const char* only[32]; /* row ids; none: all */
     size_t only_count;
     const char* program; /* path of this program, for the rows that start it */
@@ -38,12 +40,41 @@ double bench_median(double* values, size_t count); /* sorts; NaN without values 
 size_t bench_speed_rows(bench_row* rows, size_t capacity);
 bench_row* bench_find_row(bench_row* rows, size_t count, const char* id);
 
-/* bench_report.c */
+/* bench.c: the benchmarks that there are, in the page's order; NULL past the last */
+const char* bench_name(size_t index);
+
+/* bench_report.c: what one benchmark leaves in --out: NAME.json and NAME.csv with the rows, NAME-PLOT.svg and NAME-PLOT.csv, and a
+ * section of index.html, which all benchmarks that ran into one folder share. */
+enum { BENCH_MAX_PLOTS = 24 };
+typedef struct bench_report {
+    const char* name;                 /* of the benchmark */
+    const char* title;                /* for people */
+    const char* about;                /* what was done, under the title; NULL: nothing */
+    char finding[PLOT_HEADLINE_SIZE]; /* all of it in a sentence; empty: the first plot's headline */
+    demo_text figures;                /* HTML: plots, and what the benchmark adds between them */
+    demo_text members;                /* of the JSON object, each beginning with a comma: ,"points":[…] */
+    struct {
+        char id[64], headline[PLOT_HEADLINE_SIZE];
+        demo_text svg, csv;
+    } plots[BENCH_MAX_PLOTS];
+    size_t plot_count;
+    bool failed; /* memory ran out */
+} bench_report;
+/* Add a plot with its headline and caption, and its numbers folded below it. */
+void bench_report_curves(bench_report* report, const plot_curves* plot);
+void bench_report_bars(bench_report* report, const plot_bars* plot);
+/* Another drawing: an <svg> and a table for the page, the same numbers as CSV. Takes the texts. */
+void bench_report_figure(bench_report* report, const char* id, const char* headline, const char* caption, demo_text* svg, demo_text* table, demo_text* csv);
+/* Writes everything (nothing without --out) and frees the report. Rows with targets are drawn against them. */
+int bench_report_write(bench_report* report, const bench_options* options, const bench_row* rows, size_t count, const es_context* context);
+/* The rows as a table on standard output. */
 void bench_print(const bench_row* rows, size_t count);
-int bench_write(const char* name, const bench_options* options, const bench_row* rows, size_t count, const es_context* context);
 const char* bench_verdict(const bench_row* row); /* "aim", "must", "missed", "" */
 
-/* bench_plot.c: how far each row is from its target, as one SVG */
+/* bench_page.c: replaces the section `name` of DIR/index.html, keeps the others that are there */
+int bench_write_page(const char* directory, const char* name, const demo_text* section);
+
+/* bench_plot.c: how far each row is from its target */
 void bench_add_svg(demo_text* text, const bench_row* rows, size_t count);
 
 /* bench_child.c */

@@ -16,7 +16,7 @@ static double aim_score(const bench_row* row)
     return row->judge == BENCH_RATIO_AT_LEAST ? row->aim / row->must : row->must / row->aim;
 }
 
-enum { LEFT = 150, WIDTH = 760, ROW = 26, TOP = 40, RIGHT = 90 };
+enum { LEFT = 170, WIDTH = 880, ROW = 26, TOP = 40, RIGHT = 90 };
 static const double lowest = 0.1, highest = 20;
 
 static double position(double value)
@@ -31,12 +31,9 @@ void bench_add_svg(demo_text* text, const bench_row* rows, size_t count)
     size_t shown = 0;
     for (size_t i = 0; i < count; i++) shown += rows[i].judge != BENCH_NONE;
     double bottom = TOP + (double)shown * ROW;
-    demo_text_add(text,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %g\" font-family=\"system-ui,sans-serif\" "
-        "font-size=\"12\">\n",
-        WIDTH, bottom + 12);
-    demo_text_add(
-        text, "<text x=\"%d\" y=\"14\" fill=\"#333\">times better than the must (dashed: 1); tick: the aim</text>\n", LEFT);
+    plot_open_svg(text, WIDTH, bottom + 12);
+    demo_text_add(text, "<rect width=\"%d\" height=\"%g\" fill=\"#fff\"/>\n", WIDTH, bottom + 12);
+    demo_text_add(text, "<text x=\"%d\" y=\"14\" fill=\"#333\">times better than it must be</text>\n", LEFT);
     for (size_t i = 0; i < sizeof ticks / sizeof ticks[0]; i++) {
         double x = position(ticks[i]);
         demo_text_add(text,
@@ -51,7 +48,7 @@ void bench_add_svg(demo_text* text, const bench_row* rows, size_t count)
         if (row->judge == BENCH_NONE) continue;
         double y = TOP + (double)k++ * ROW, s = score(row), a = position(aim_score(row));
         const char* verdict = bench_verdict(row);
-        const char* colour = !strcmp(verdict, "aim") ? "#2a9d5c" : !strcmp(verdict, "must") ? "#d9a21b" : "#c8453b";
+        const char* colour = !strcmp(verdict, "aim") ? "#009e73" : !strcmp(verdict, "must") ? "#e69f00" : "#d55e00";
         demo_text_add(text, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\" fill=\"#333\">%s</text>\n", LEFT - 8, y + 17, row->id);
         if (isnan(s)) {
             demo_text_add(text, "<text x=\"%d\" y=\"%.1f\" fill=\"#999\">not measured</text>\n", LEFT + 6, y + 17);

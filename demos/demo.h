@@ -110,6 +110,10 @@ void demo_text_free(demo_text* text);
 
 /* {"processor":…,"isa":…,"threads":…,"compiler":…,"commit":…,"flags":…,"version":…} */
 void demo_text_add_machine(demo_text* text, const es_context* context);
+/* The same in a line for people, with the time of day: a page that is kept says when it was made. */
+void demo_text_add_machine_line(demo_text* text, const es_context* context);
+/* "2026-11-25 16:02 UTC" */
+void demo_date(char date[32]);
 void demo_processor_name(char* name, size_t size);
 double demo_seconds(void);
 

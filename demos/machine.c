@@ -4,6 +4,7 @@
 
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 double demo_seconds(void)
 {
@@ -44,4 +45,22 @@ void demo_text_add_machine(demo_text* text, const es_context* context)
     demo_text_add(text, ",\"flags\":");
     demo_text_add_json_string(text, DEMO_FLAGS);
     demo_text_add(text, ",\"version\":\"%d.%d.%d\"}", ES_VERSION_MAJOR, ES_VERSION_MINOR, ES_VERSION_PATCH);
+}
+
+void demo_date(char date[32])
+{
+    time_t now = time(NULL);
+    struct tm parts;
+    date[0] = 0;
+    if (gmtime_r(&now, &parts)) strftime(date, 32, "%Y-%m-%d %H:%M UTC", &parts);
+}
+
+void demo_text_add_machine_line(demo_text* text, const es_context* context)
+{
+    char processor[256], date[32];
+    demo_processor_name(processor, sizeof processor);
+    demo_date(date);
+    demo_text_add(text, "%s, %ld processors online · instruction set %s · %u threads · compiler %s · commit %s · version %d.%d.%d · %s · flags %s", processor,
+        sysconf(_SC_NPROCESSORS_ONLN), es_isa_name(es_context_isa(context)), es_context_resolved_desc(context).threads, DEMO_COMPILER, DEMO_COMMIT, ES_VERSION_MAJOR,
+        ES_VERSION_MINOR, ES_VERSION_PATCH, date, DEMO_FLAGS);
 }

@@ -28,7 +28,9 @@ static const char usage[] =
     "  earthshine images                                list the images a frame can give\n"
     "  earthshine compare A B [--diff OUT.png] [--max-rmse X] [--max-relrmse X] [--max-relmse X] [--max-max X]\n"
     "                                                   error of A against the reference B; exit 1 when a limit is exceeded\n"
-    "  earthshine bench  [NAME …] [--out DIR]           tables and plots: speed, frame\n"
+    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), frame, all; tables, JSON, CSV, SVG and one\n"
+    "                                                   page DIR/index.html\n"
+    "             --threads N (2) --runs N (5) --only ROW --no-peer --quick\n"
     "  earthshine help | --version\n"
     "play takes render's options too; with --frames or --out it needs no window.\n";
 

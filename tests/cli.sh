@@ -227,17 +227,34 @@ refused '--runs 0' bench speed --runs 0
 refused 'cannot be written' bench speed --out /proc/self
 expect 0 bench speed --runs 1 --no-peer --only gbuffer-70k --out figures
 says '^gbuffer-70k +[0-9.]+ ms '
-for ending in json csv svg html; do [ -s figures/speed.$ending ] || fail "no speed.$ending"; done
+for file in speed.json speed.csv speed-targets.svg index.html; do [ -s figures/$file ] || fail "no $file"; done
+expect 0 bench frame --runs 1 --no-peer --out figures
 if command -v python3 >/dev/null; then
     checks=$((checks + 1))
-    python3 - <<'PYTHON' >out 2>err || fail 'speed.json is not as described'
-import json, xml.etree.ElementTree
-report = json.load(open('figures/speed.json'))
-row, = report['rows']
+    python3 - <<'PYTHON' >out 2>err || fail 'the files of bench are not as described'
+import glob, json, re, xml.etree.ElementTree as tree
+for name in ('speed', 'frame'):
+    report = json.load(open(f'figures/{name}.json'))
+    assert set(report['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit'}, report['machine']
+    assert report['date'].startswith('20') and report['rows'], report
+    for row in report['rows']:
+        assert set(row) >= {'id', 'value', 'unit', 'peer', 'peer_value', 'ratio'}, row
+row, = json.load(open('figures/speed.json'))['rows']
 assert row['id'] == 'gbuffer-70k' and row['value'] > 0 and row['unit'] == 'ms' and row['ratio'] is None, row
-assert set(row) >= {'id', 'value', 'unit', 'peer', 'peer_value', 'ratio'}
-assert set(report['machine']) >= {'processor', 'isa', 'threads'}
-xml.etree.ElementTree.parse('figures/speed.svg')
+for drawing in glob.glob('figures/*.svg'):
+    tree.parse(drawing)
+text = open('figures/index.html').read()
+page = tree.fromstring(text)  # well-formed as XML too
+assert [s.get('id') for s in page.iter('section')] == ['speed', 'frame'], 'a run keeps the sections of others'
+names = {element.tag for element in page.iter()}
+assert not names & {'script', 'link', 'img', 'iframe', 'object', 'image', 'use'}, names
+assert not re.search(r'https?:|url\(|@import|src=', text), 'the page loads something'
+ids = [element.get('id') for element in page.iter() if element.get('id')]
+assert len(ids) == len(set(ids)), 'an id is there twice'
+for link in page.iter('a'):
+    assert link.get('href')[1:] in ids, link.get('href')
+for word in ('compiler', 'commit', 'threads', 'instruction set', 'UTC'):
+    assert word in text, word
 PYTHON
 fi
 
