@@ -18,12 +18,12 @@ typedef enum es_gi_method {
     ES_GI_NONE,     /* direct light only */
     ES_GI_ISM,      /* virtual point lights, imperfect shadow maps (Ritschel thesis §5.2) */
     ES_GI_CLASSIC,  /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
-    ES_GI_VPL_TRACED /* the same lights, visibility by rays, every light at every pixel: a judge; slower */
+    ES_GI_VPL_TRACED /* the same lights, visibility by rays, every light at every pixel unless traced_interleave: a judge; slower */
 } es_gi_method;
 
-/* What ES_GI_VPL_TRACED makes of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
+/* What the methods with virtual point lights make of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
 typedef enum es_traced_bias {
-    ES_TRACED_BOUNDED,      /* as the real-time methods have them */
+    ES_TRACED_BOUNDED,      /* the pair's light has them */
     ES_TRACED_UNBOUNDED,    /* none of them: right on average, spots of any brightness near the lights */
     ES_TRACED_COMPENSATED   /* all of them, and what they leave out found by rays (Kollig and Keller 2004): right on average, without spots */
 } es_traced_bias;
@@ -60,9 +60,10 @@ typedef struct es_renderer_settings {
     float ism_bias;                  /* share of the scene's extent */
     float ism_slope_bias;            /* share of the scene's extent, over the cosine at the pixel; about the width of a splat */
     uint32_t classic_size;           /* texels of a classic map's side */
-    /* traced visibility */
-    uint32_t traced_bias;            /* es_traced_bias */
+    /* rays: what makes one approximation exact and leaves the others as they are */
+    uint32_t traced_bias;            /* es_traced_bias; with every method that has virtual point lights */
     uint32_t traced_samples;         /* COMPENSATED: rays per pixel */
+    bool traced_interleave;          /* VPL_TRACED: interleave and filter_passes apply as they do to the other methods; off: as if 1 and 0 */
     /* interleaved shading and filter */
     uint32_t interleave;             /* n of the n × n pattern, 1 … 16 */
     uint32_t filter_passes;          /* 0: none; 1: a box, in which single bright pixels leave n × n blocks; 2: a tent, which is smooth */

@@ -394,6 +394,9 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
 /* 1/m², in place of the bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
 #define UNBOUNDED 1e18f
 
+/* At every pixel, whatever the setting of the pattern. */
+static bool every_light(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED && !s->traced_interleave; }
+
 static es_result pass_shading(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
@@ -409,8 +412,8 @@ static es_result pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_ISM);
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
     es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
-    const bool traced = s->method == ES_GI_VPL_TRACED, unbounded = traced && s->traced_bias == ES_TRACED_UNBOUNDED;
-    const uint32_t interleave = traced ? 1 : s->interleave;
+    const bool traced = s->method == ES_GI_VPL_TRACED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
+    const uint32_t interleave = every_light(s) ? 1 : s->interleave;
     float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
@@ -443,7 +446,7 @@ static es_result pass_filter(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : s->method == ES_GI_VPL_TRACED ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
     r->filter_passes = why ? 0 : s->filter_passes;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_FILTER, why);

@@ -37,8 +37,9 @@ static const es_setting renderer_table[] = {
     {"classic.size", ES_SETTING_INT, "256", 32, 1024, NULL, "texels of a classic map's side, a power of two", AT(classic_size)},
 
     {"traced.bias", ES_SETTING_CHOICE, "bounded", 0, 0, "bounded|unbounded|compensated",
-        "vpl-traced: vpl.bound, vpl.spread and vpl.roughness apply, or do not, or do and rays find what they leave out", AT(traced_bias)},
-    {"traced.samples", ES_SETTING_INT, "16", 1, 65536, NULL, "vpl-traced, compensated: rays per pixel", AT(traced_samples)},
+        "vpl.bound, vpl.spread and vpl.roughness apply, or do not, or do and rays find what they leave out", AT(traced_bias)},
+    {"traced.samples", ES_SETTING_INT, "16", 1, 65536, NULL, "traced.bias compensated: rays per pixel", AT(traced_samples)},
+    {"traced.interleave", ES_SETTING_BOOL, "false", 0, 1, NULL, "vpl-traced: interleave and filter.passes apply; otherwise every pixel has every light", AT(traced_interleave)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
     {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent", AT(filter_passes)},

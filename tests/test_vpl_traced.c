@@ -138,17 +138,21 @@ static int meets_plate(es_vec3 a, es_vec3 b)
     return u > edge && v > edge && u < 1 - edge && v < 1 - edge ? 1 : -1;
 }
 
-/* Every pixel is the sum over all lights of flux / pi · min(cos cos / d², bound), where the plate does not come between. */
-static void test_all_pairs(void** state)
+/* Every pixel is the sum over its lights of flux / pi · min(cos cos / d², bound), where the plate does not come between. Interleaved, those
+ * are the lights of its phase, each n² times as bright. */
+static void check_all_pairs(bool interleaved)
 {
+    const uint32_t side = interleaved ? 4 : 1;
     small_world w = corner(DIFFUSE, true, 2, 0, 0);
     es_renderer_settings s = settings_of(ES_TRACED_BOUNDED);
     s.spread = 0;
     s.geometry_bound = 4 * EXTENT2;
+    s.traced_interleave = interleaved;
+    if (interleaved) s.filter_passes = 0; /* and otherwise it does not matter */
     es_renderer* renderer = create(w.context, &s);
     assert_int_equal(es_renderer_render(renderer, w.world), ES_OK);
-    assert_string_equal(pass(renderer, "filter")->skipped, "gi is vpl-traced: every pixel has every light");
-    assert_int_equal(pass(renderer, "shading")->count, PIXELS * 64);
+    assert_string_equal(pass(renderer, "filter")->skipped, interleaved ? "filter.passes is 0" : "gi is vpl-traced: every pixel has every light");
+    assert_int_equal(pass(renderer, "shading")->count, PIXELS * 64 / (side * side));
     es_image irradiance = picture(renderer, "irradiance"), depth = picture(renderer, "depth"), normal = picture(renderer, "normal");
     static es_vpl vpls[64];
     size_t count = es_renderer_vpls(renderer, vpls, 64);
@@ -162,10 +166,10 @@ static void test_all_pairs(void** state)
         seen++;
         es_vec3 p = es_pixel_rays_position(&rays, (float)(i % WIDTH), (float)(i / WIDTH), depth.pixels[i]), n = es_v3(normal.pixels[3 * i], normal.pixels[3 * i + 1], normal.pixels[3 * i + 2]);
         double low = 0, high = 0;
-        for (size_t v = 0; v < count; v++) {
+        for (size_t v = i % WIDTH % side + side * (i / WIDTH % side); v < count; v += side * side) {
             es_vec3 d = es_v3_sub(vpls[v].position, p);
             double cosines = fmax((double)es_v3_dot(d, n), 0) * fmax(-(double)es_v3_dot(d, vpls[v].normal), 0), d2 = (double)es_v3_dot(d, d);
-            double geometry = fmin(cosines / (d2 * d2), 4), e = geometry * (double)vpls[v].flux[0] / pi;
+            double geometry = fmin(cosines / (d2 * d2), 4), e = geometry * side * side * (double)vpls[v].flux[0] / pi;
             int met = e > 0 ? meets_plate(p, vpls[v].position) : 0;
             hidden += met == 1;
             bounded += geometry == 4;
@@ -175,13 +179,15 @@ static void test_all_pairs(void** state)
         double found = (double)irradiance.pixels[3 * i];
         if (!(found >= low * 0.9999 - 1e-9 && found <= high * 1.0001 + 1e-9)) fail_msg("pixel %u: %.6g, expected %.6g to %.6g", i, found, low, high);
     }
-    if (!(seen > PIXELS / 2 && hidden > 200 && bounded > 10)) fail_msg("%d pixels, %d pairs hidden, %d bounded", seen, hidden, bounded);
+    if (!(seen > PIXELS / 2 && hidden > (interleaved ? 12 : 200) && bounded > (interleaved ? 0 : 10))) fail_msg("%d pixels, %d pairs hidden, %d bounded", seen, hidden, bounded);
     es_image_destroy(w.context, &irradiance);
     es_image_destroy(w.context, &depth);
     es_image_destroy(w.context, &normal);
     es_renderer_destroy(renderer);
     small_world_destroy(&w);
 }
+static void test_all_pairs(void** state) { check_all_pairs(false); }
+static void test_interleaved_pairs(void** state) { check_all_pairs(true); }
 
 /* Where nothing hides anything, rays and maps that hide nothing give the same bits. */
 static void test_open_world(void** state)
@@ -210,6 +216,96 @@ static void test_open_world(void** state)
         es_image_destroy(w.context, &traced);
         small_world_destroy(&w);
     }
+}
+
+static void assert_same(const es_image* a, const es_image* b, const char* what)
+{
+    double sum = 0;
+    for (int i = 0; i < PIXELS * 3; i++) {
+        if (a->pixels[i] != b->pixels[i]) fail_msg("%s: pixel %d is %.8g and %.8g", what, i / 3, (double)a->pixels[i], (double)b->pixels[i]);
+        sum += (double)a->pixels[i];
+    }
+    assert_true(sum > 1);
+}
+
+/* The method of visibility alone changes: interleaved and filtered, rays and maps that hide nothing give the same bits, and where there is
+ * something to hide, they do not. */
+static void test_visibility_alone(void** state)
+{
+    for (surfaces kind = DIFFUSE; kind <= GLOSSY; kind++)
+        for (int plates = 0; plates < 2; plates++) {
+            small_world w = corner(kind, plates, 2, 0, 0);
+            es_renderer_settings s = settings_of(ES_TRACED_BOUNDED);
+            s.traced_interleave = true;
+            s.filter_passes = 2;
+            s.ism_bias = 1;
+            s.ism_points = s.ism_pool = 64;
+            for (int unbounded = 0; unbounded < 2; unbounded++) {
+                s.traced_bias = unbounded ? ES_TRACED_UNBOUNDED : ES_TRACED_BOUNDED;
+                s.method = ES_GI_VPL_TRACED;
+                es_image traced = render(&w, &s, "indirect"), unfiltered = render(&w, &s, "indirect-unfiltered");
+                s.method = ES_GI_ISM;
+                es_image mapped = render(&w, &s, "indirect"), mapped_unfiltered = render(&w, &s, "indirect-unfiltered");
+                if (plates) {
+                    assert_int_not_equal(es_image_hash(&traced), es_image_hash(&mapped));
+                } else {
+                    assert_same(&traced, &mapped, "filtered");
+                    assert_same(&unfiltered, &mapped_unfiltered, "unfiltered");
+                    assert_int_not_equal(es_image_hash(&traced), es_image_hash(&unfiltered));
+                }
+                es_image* all[] = {&traced, &unfiltered, &mapped, &mapped_unfiltered};
+                for (int i = 0; i < 4; i++) es_image_destroy(w.context, all[i]);
+            }
+            small_world_destroy(&w);
+        }
+}
+
+/* Without a pattern to interleave by, the switch for it changes nothing. */
+static void test_pattern_of_one(void** state)
+{
+    small_world w = corner(GLOSSY, true, 2, 0, 0);
+    es_renderer_settings s = settings_of(ES_TRACED_COMPENSATED);
+    s.traced_samples = 2;
+    s.interleave = 1;
+    es_image alone = render(&w, &s, "indirect");
+    s.traced_interleave = true;
+    es_image switched = render(&w, &s, "indirect");
+    s.filter_passes = 0;
+    es_image unfiltered = render(&w, &s, "indirect");
+    assert_same(&alone, &switched, "interleave 1");
+    assert_same(&alone, &unfiltered, "interleave 1, no filter");
+    es_image_destroy(w.context, &alone);
+    es_image_destroy(w.context, &switched);
+    es_image_destroy(w.context, &unfiltered);
+    small_world_destroy(&w);
+}
+
+/* With maps too, compensation is what rays find, added to what is gathered. */
+static void test_compensation_alone(void** state)
+{
+    small_world w = corner(GLOSSY, true, 2, 0, 0);
+    es_renderer_settings s = settings_of(ES_TRACED_COMPENSATED);
+    s.traced_samples = 3;
+    s.ism_points = s.ism_pool = 1024;
+    s.filter_passes = 2;
+    es_image compensation = render(&w, &s, "compensation");
+    s.method = ES_GI_ISM;
+    es_renderer* renderer = create(w.context, &s);
+    assert_int_equal(es_renderer_render(renderer, w.world), ES_OK);
+    es_image compensated = picture(renderer, "indirect"), of_maps = picture(renderer, "compensation");
+    assert_same(&compensation, &of_maps, "compensation");
+    s.traced_bias = ES_TRACED_BOUNDED;
+    assert_int_equal(es_renderer_configure(renderer, &s), ES_OK);
+    assert_int_equal(es_renderer_render(renderer, w.world), ES_OK);
+    assert_string_equal(pass(renderer, "ray hierarchy")->skipped, "gi is not vpl-traced");
+    assert_null(renderer->trace_scene.bvh);
+    es_image bounded = picture(renderer, "indirect");
+    for (int i = 0; i < PIXELS * 3; i++) bounded.pixels[i] += compensation.pixels[i];
+    assert_same(&bounded, &compensated, "bounded and compensation");
+    es_renderer_destroy(renderer);
+    es_image* all[] = {&compensation, &compensated, &of_maps, &bounded};
+    for (int i = 0; i < 4; i++) es_image_destroy(w.context, all[i]);
+    small_world_destroy(&w);
 }
 
 /* ---- bias -------------------------------------------------------------------------------------------------------------------------------- */
@@ -447,7 +543,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_all_pairs),
+        cmocka_unit_test(test_interleaved_pairs),
         cmocka_unit_test(test_open_world),
+        cmocka_unit_test(test_visibility_alone),
+        cmocka_unit_test(test_pattern_of_one),
+        cmocka_unit_test(test_compensation_alone),
         cmocka_unit_test(test_bounding_takes_away),
         cmocka_unit_test(test_bias_of_diffuse_surfaces),
         cmocka_unit_test(test_bias_of_lobes),
