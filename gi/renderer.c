@@ -20,7 +20,7 @@ es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuf
     size_t floats = (size_t)gbuffer->stride * gbuffer->height, bytes = 3 * floats * sizeof(float);
     if (planes->bytes == bytes) return ES_OK;
     es_planes_free(context, planes);
-    planes->memory = es_allocate(context, bytes); /* each pass writes all of its planes */
+    planes->memory = es_allocate_zero(context, bytes); /* passes write pixels, vectors read the padding of rows as well */
     if (!planes->memory) return es_context_last_result(context);
     planes->bytes = bytes;
     for (int k = 0; k < 3; k++) planes->at[k] = (float*)planes->memory + (size_t)k * floats;

@@ -28,10 +28,12 @@ static inline three xyz_by_white(three c)
 
 static inline vf unit(vf a) { return vf_min(vf_max(a, vf_zero()), vf_set1(1.0f)); }
 
-/* Radiance, not negative, to the display. Above 1e4 the curves have long been at 1, and squares stay finite. */
+/* Radiance, not negative, to the display. Above 1e4 the curves have long been at 1, and squares stay finite; what the scale would take
+ * out of the range of floats is cut off before. */
 static inline three shown(const es_flip_job* job, three c, float scale)
 {
-    const vf s = vf_set1(scale), high = vf_set1(1e4f), one = vf_set1(1.0f);
+    const vf s = vf_set1(scale), high = vf_set1(1e4f), most = vf_set1(scale > 1.0f ? 2e4f / scale : 3e38f), one = vf_set1(1.0f);
+    c = (three){vf_min(c.x, most), vf_min(c.y, most), vf_min(c.z, most)};
     if (job->tone == ES_FLIP_LINEAR) return (three){unit(c.x * s), unit(c.y * s), unit(c.z * s)};
     c = (three){vf_min(c.x * s, high), vf_min(c.y * s, high), vf_min(c.z * s, high)};
     if (job->tone == ES_FLIP_REINHARD) {

@@ -22,16 +22,21 @@
 typedef struct stress { es_context* context; es_world* world; es_node root; es_camera camera; float scale; } stress;
 
 /* Everything below is a child of a node that scales by `scale` and then moves by `offset`. */
-static inline stress stress_open(float scale, es_vec3 offset)
+static inline stress stress_open_in(const es_context_desc* desc, float scale, es_vec3 offset)
 {
     stress s = {.scale = scale};
-    es_context_desc desc = es_default_context_desc();
-    desc.threads = 2;
-    assert_int_equal(es_context_create(&desc, &s.context), ES_OK);
+    assert_int_equal(es_context_create(desc, &s.context), ES_OK);
     assert_int_equal(es_world_create(s.context, NULL, &s.world), ES_OK);
     es_node_desc root = {.transform = {offset, {0, 0, 0, 1}, {scale, scale, scale}}};
     assert_int_equal(es_world_add_node(s.world, &root, &s.root), ES_OK);
     return s;
+}
+
+static inline stress stress_open(float scale, es_vec3 offset)
+{
+    es_context_desc desc = es_default_context_desc();
+    desc.threads = 2;
+    return stress_open_in(&desc, scale, offset);
 }
 
 static inline void stress_close(stress* s)
