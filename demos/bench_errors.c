@@ -1,7 +1,6 @@
 /* The error rows of `bench speed`: the peers' room against references that share no code with this project, and imperfect
  * against accurate shadow maps. Errors do not depend on the machine, so they are measured once. */
 #include "bench.h"
-#include "metrics.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -66,15 +65,12 @@ static uint8_t* shadow_edge_mask(const es_image* reference, double* share)
     return mask;
 }
 
-static void fill_error(bench_row* row, const es_image* image, const es_image* reference, const uint8_t* mask)
+static void fill_error(es_context* context, bench_row* row, const es_image* image, const es_image* reference, const uint8_t* mask)
 {
-    demo_channels channels;
-    if (!image->pixels || !reference->pixels || image->width != reference->width || image->height != reference->height ||
-        !demo_match_channels(image, reference, &channels)) {
-        snprintf(row->note, sizeof row->note, "no picture or no reference to compare");
-        return;
-    }
-    row->value = demo_measure(image, reference, &channels, mask).relrmse;
+    es_error_desc desc = {.mask = mask};
+    es_image_error error;
+    if (image->pixels && reference->pixels && es_image_compare(context, image, reference, &desc, &error) == ES_OK) row->value = error.relrmse;
+    else snprintf(row->note, sizeof row->note, "no picture or no reference to compare");
 }
 
 void bench_measure_errors(const bench_options* options, const bench_peer* peer, bench_row* rows, size_t count)
@@ -89,13 +85,13 @@ void bench_measure_errors(const bench_options* options, const bench_peer* peer, 
         es_image indirect = room_image(context, peer, ES_GI_ISM, "indirect");
         if (indirect_wanted) {
             es_image reference = reference_image(context, peer, "room_indirect_reference.exr");
-            fill_error(bench_find_row(rows, count, "indirect-room"), &indirect, &reference, NULL);
+            fill_error(context, bench_find_row(rows, count, "indirect-room"), &indirect, &reference, NULL);
             es_image_destroy(context, &reference);
         }
         if (classic_wanted) {
             fputs("an accurate shadow map for each light\n", stderr);
             es_image classic = room_image(context, peer, ES_GI_CLASSIC, "indirect");
-            fill_error(bench_find_row(rows, count, "ism-vs-classic"), &indirect, &classic, NULL);
+            fill_error(context, bench_find_row(rows, count, "ism-vs-classic"), &indirect, &classic, NULL);
             es_image_destroy(context, &classic);
         }
         es_image_destroy(context, &indirect);
@@ -106,7 +102,7 @@ void bench_measure_errors(const bench_options* options, const bench_peer* peer, 
         bench_row* row = bench_find_row(rows, count, "direct-room");
         double share = 0;
         uint8_t* mask = reference.pixels && reference.channels >= 3 ? shadow_edge_mask(&reference, &share) : NULL;
-        fill_error(row, &direct, mask ? &reference : &(es_image){0}, mask);
+        fill_error(context, row, &direct, mask ? &reference : &(es_image){0}, mask);
         if (mask && !isnan(row->value)) snprintf(row->note, sizeof row->note, "over %.1f %% of the pixels", share * 100);
         free(mask);
         es_image_destroy(context, &direct);

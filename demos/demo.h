@@ -49,6 +49,8 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
 /* Whole-string numbers within a range; false otherwise. */
 bool demo_parse_uint(const char* text, uint32_t minimum, uint32_t maximum, uint32_t* value);
 bool demo_parse_double(const char* text, double minimum, double maximum, double* value);
+/* "A:B", B > A. */
+int demo_parse_frames(const char* text, uint32_t* first, uint32_t* end);
 const char* demo_method_name(uint32_t method);
 
 /* ---- settings (settings.c) --------------------------------------------------------------------------------------- */
@@ -82,8 +84,10 @@ int demo_session_step(demo_session* session, uint32_t frame, double fps);
 
 enum { DEMO_PATH_SIZE = 4096 };
 
-/* A file name with at most one frame number, %d or %0Nd; %% stands for a percent sign. */
-int demo_check_pattern(const char* pattern, uint32_t frames);
+/* The name of an image's file with at most one frame number, %d or %0Nd; %% stands for a percent sign. `option` begins a refusal. */
+int demo_check_pattern(const char* option, const char* pattern, uint32_t frames);
+/* The number alone, of a file that is read too: adds to `numbers` how many there are. */
+int demo_check_numbers(const char* option, const char* pattern, unsigned* numbers);
 /* The name of one frame's file; the pattern was checked. */
 void demo_expand_pattern(const char* pattern, uint32_t frame, char path[DEMO_PATH_SIZE]);
 /* Tries to make a file where `path` will be, and removes it: refusals come before the work. */
@@ -93,6 +97,13 @@ bool demo_has_image_ending(const char* path);
 es_image_save_desc demo_save_desc(void);
 /* Writes text to a temporary name and renames it: never a half-written file. */
 int demo_write_text(const char* path, const char* text, size_t size);
+
+/* ---- images in a file (image_layer.c) ---------------------------------------------------------------------------- */
+
+/* Keeps the channels of the image `name` of a file with several ("name.R" …; "radiance" is also a reference's main image), or
+ * without a name those of the main image where there is one. An image alone in its file is kept as it is. Refuses a name that the
+ * file does not have, and says which it has. */
+int demo_select_layer(es_context* context, es_image* image, const char* path, const char* name);
 
 /* ---- text that grows (text.c) ------------------------------------------------------------------------------------ */
 

@@ -47,17 +47,15 @@ static int parse_size(const char* text, demo_options* options)
     return DEMO_OK;
 }
 
-static int parse_frames(const char* text, demo_options* options)
+int demo_parse_frames(const char* text, uint32_t* first, uint32_t* end)
 {
     char copy[32];
     snprintf(copy, sizeof copy, "%s", text);
     char* colon = strchr(copy, ':');
     if (colon) *colon = 0;
-    if (strlen(text) >= sizeof copy || !colon || !demo_parse_uint(copy, 0, DEMO_MAX_FRAMES, &options->first) ||
-        !demo_parse_uint(colon + 1, 0, DEMO_MAX_FRAMES, &options->end))
+    if (strlen(text) >= sizeof copy || !colon || !demo_parse_uint(copy, 0, DEMO_MAX_FRAMES, first) || !demo_parse_uint(colon + 1, 0, DEMO_MAX_FRAMES, end))
         return demo_refuse("--frames %s: A:B is expected, frames A to B - 1, at most %d", text, DEMO_MAX_FRAMES);
-    if (options->first >= options->end) return demo_refuse("--frames %s: holds no frame; A:B renders A to B - 1", text);
-    options->frames_given = true;
+    if (*first >= *end) return demo_refuse("--frames %s: holds no frame; A:B is A to B - 1", text);
     return DEMO_OK;
 }
 
@@ -105,7 +103,8 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
     case SIZE:
         return parse_size(value, options);
     case FRAMES:
-        return parse_frames(value, options);
+        options->frames_given = true;
+        return demo_parse_frames(value, &options->first, &options->end);
     case FPS:
         if (demo_parse_double(value, 0.1, 10000, &options->fps)) return DEMO_OK;
         return demo_refuse("--fps %s: a number from 0.1 to 10000 is expected", value);

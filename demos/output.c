@@ -23,11 +23,10 @@ static size_t conversion_length(const char* percent)
     return 0;
 }
 
-int demo_check_pattern(const char* pattern, uint32_t frames)
+int demo_check_numbers(const char* option, const char* pattern, unsigned* numbers)
 {
-    if (!demo_has_image_ending(pattern)) return demo_refuse("--out %s: the name must end in .exr, .png or .hdr", pattern);
-    if (strlen(pattern) > DEMO_PATH_SIZE - 64) return demo_refuse("--out: the name is longer than %d bytes", DEMO_PATH_SIZE - 64);
-    unsigned numbers = 0;
+    if (strlen(pattern) > DEMO_PATH_SIZE - 64) return demo_refuse("%s: the name is longer than %d bytes", option, DEMO_PATH_SIZE - 64);
+    unsigned found = 0;
     for (const char* c = pattern; *c; c++) {
         if (*c != '%') continue;
         if (c[1] == '%') {
@@ -36,15 +35,21 @@ int demo_check_pattern(const char* pattern, uint32_t frames)
         }
         size_t length = conversion_length(c);
         if (!length)
-            return demo_refuse(
-                "--out %s: after %% only d or 0Nd (N from 1 to 9) may stand for the frame's number, %%%% for a percent sign",
-                pattern);
-        numbers++;
+            return demo_refuse("%s %s: after %% only d or 0Nd (N from 1 to 9) may stand for the frame's number, %%%% for a percent sign", option, pattern);
+        found++;
         c += length - 1;
     }
-    if (numbers > 1) return demo_refuse("--out %s: one frame number at most", pattern);
-    if (!numbers && frames > 1)
-        return demo_refuse("--out %s: %u frames would overwrite one file; put %%04d into the name", pattern, frames);
+    if (found > 1) return demo_refuse("%s %s: one frame number at most", option, pattern);
+    *numbers += found;
+    return DEMO_OK;
+}
+
+int demo_check_pattern(const char* option, const char* pattern, uint32_t frames)
+{
+    unsigned numbers = 0;
+    if (!demo_has_image_ending(pattern)) return demo_refuse("%s %s: the name must end in .exr, .png or .hdr", option, pattern);
+    if (demo_check_numbers(option, pattern, &numbers) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (!numbers && frames > 1) return demo_refuse("%s %s: %u frames would overwrite one file; put %%04d into the name", option, pattern, frames);
     return DEMO_OK;
 }
 

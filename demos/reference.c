@@ -99,7 +99,7 @@ static int check_out(const demo_options* options)
     char path[DEMO_PATH_SIZE];
     if (!options->out) return DEMO_OK;
     if (options->image_count > 1) return demo_refuse("--out takes one image; %zu were named with --image", options->image_count);
-    if (demo_check_pattern(options->out, options->end - options->first) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (demo_check_pattern("--out", options->out, options->end - options->first) != DEMO_OK) return DEMO_BAD_INPUT;
     demo_expand_pattern(options->out, options->first, path);
     return demo_check_writable(path);
 }

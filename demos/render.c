@@ -60,7 +60,7 @@ int demo_render_frames(const demo_options* given, bool show_progress)
         char path[DEMO_PATH_SIZE];
         if (options.image_count > 1)
             return demo_refuse("--out takes one image; %zu were named with --image", options.image_count);
-        if (demo_check_pattern(options.out, options.end - options.first) != DEMO_OK) return DEMO_BAD_INPUT;
+        if (demo_check_pattern("--out", options.out, options.end - options.first) != DEMO_OK) return DEMO_BAD_INPUT;
         demo_expand_pattern(options.out, options.first, path);
         if (demo_check_writable(path) != DEMO_OK) return DEMO_BAD_INPUT;
     }

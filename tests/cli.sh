@@ -177,17 +177,88 @@ grep -q EARTHSHINE_WITH_TINYGLTF:BOOL=OFF "$build/CMakeCache.txt" || refused 'AC
 # ---- compare ---------------------------------------------------------------------------------------------------------
 expect 0 render cornell "${small[@]}" --out a.exr --image direct
 expect 0 render cornell "${small[@]}" --out b.exr --image direct --frames 1:2 --fps 2
+metrics='rmse relrmse relmse rell1 flip hdr_flip max'
 expect 0 compare a.exr a.exr
-for name in rmse relrmse relmse max; do says "^$name 0$"; done
+for name in $metrics; do says "^$name 0$"; done
 expect 0 compare a.exr b.exr --diff diff.png
-says '^rmse [0-9.]+$'
+[ "$(cut -d' ' -f1 out | tr '\n' ' ')" = "$metrics " ] || fail 'a name and a value a line, in their order'
+for name in $metrics; do says "^$name [0-9.e-]+$"; done
 [ -s diff.png ] || fail 'no picture of the difference'
-[ "$(wc -l <out)" = 4 ] || fail 'a value a line'
-expect 1 compare a.exr b.exr --max-rmse 1e-9
-says '^rmse '
-says 'limit' err
-expect 1 compare a.exr b.exr --max-max 1e-9
-expect 0 compare a.exr b.exr --max-rmse 1000 --max-relrmse 1000 --max-relmse 1000 --max-max 1000
+cp out all_threads
+expect 0 compare a.exr b.exr --threads 1
+cmp -s out all_threads || fail 'an error depends on the number of threads'
+for map in absolute relative signed flip hdr-flip; do
+    expect 0 compare a.exr b.exr --diff "map-$map.png" --map $map --scale 0.5
+    says '0\.5' err
+    [ -s "map-$map.png" ] || fail "no map $map"
+done
+[ "$(cat map-*.png | cksum)" != "$(cat map-absolute.png map-absolute.png map-absolute.png map-absolute.png map-absolute.png | cksum)" ] || fail 'all maps are the same'
+for name in $metrics; do
+    expect 1 compare a.exr b.exr --max-$name 1e-9
+    says "$name is .* limit" err
+    says '^rmse '
+    expect 0 compare a.exr b.exr --max-$name 1e9
+done
+
+# as displayed: a PNG has no radiance
+expect 0 render cornell "${small[@]}" --out a.png
+expect 0 render cornell "${small[@]}" --out b.png --frames 1:2 --fps 2
+expect 0 compare a.png b.png
+says '^hdr_flip -?nan$'
+says '^flip 0\.[0-9]+$'
+expect 0 compare a.exr b.exr --display-referred
+says '^hdr_flip -?nan$'
+refused 'no such number' compare a.png b.png --max-hdr_flip 1
+refused 'display-referred' compare a.png b.png --diff x.png --map hdr-flip
+expect 0 render cornell "${small[@]}" --out depth.exr --image depth
+expect 0 compare depth.exr depth.exr --max-rmse 0
+says '^flip -?nan$'
+
+# sequences
+expect 0 render cornell "${small[@]}" --out 'a%02d.exr' --image direct --frames 0:3 --fps 5
+expect 0 render cornell "${small[@]}" --out 'b%d.exr' --image direct --frames 0:3 --fps 4
+expect 0 compare 'a%02d.exr' 'b%d.exr' --frames 0:3 --each --diff 'd%d.png' --map signed
+says '^flicker [0-9.]+$'
+[ "$(grep -c '^frame ' out)" = 21 ] || fail 'seven numbers for each of three frames'
+[ -s d0.png ] && [ -s d2.png ] || fail 'no map of each frame'
+if command -v python3 >/dev/null; then
+    cp out sequence
+    checks=$((checks + 1))
+    python3 - <<'PYTHON' 2>err || fail 'the means are not those of the frames'
+lines = [line.split() for line in open('sequence')]
+frames = {}
+for _, _, name, value in (line for line in lines if line[0] == 'frame'):
+    frames.setdefault(name, []).append(float(value))
+totals = {line[0]: float(line[1]) for line in lines if len(line) == 2}
+for name, values in frames.items():
+    expected = max(values) if name == 'max' else sum(values) / 3
+    assert abs(totals[name] - expected) <= 1e-7 * expected, (name, totals[name], expected)
+PYTHON
+fi
+expect 0 compare 'a%02d.exr' 'a%02d.exr' --frames 0:3 --max-flicker 0
+expect 1 compare 'a%02d.exr' a00.exr --frames 0:3 --max-flicker 1e-6
+expect 0 compare 'a%02d.exr' a01.exr --frames 1:2 --max-rmse 0
+refused 'two frames' compare 'a%02d.exr' a00.exr --frames 1:2 --max-flicker 1
+refused 'there is no file a03.exr' compare 'a%02d.exr' 'b%d.exr' --frames 0:4
+refused 'holds a frame' compare a.exr b.exr --frames 0:2
+refused 'put %04d' compare 'a%02d.exr' 'b%d.exr' --frames 0:2 --diff d.png
+refused 'may stand for' compare 'a%s.exr' 'b%d.exr' --frames 0:2
+refused 'A:B is expected' compare a.exr b.exr --frames 2
+
+# one of a file's images
+expect 0 reference cornell --size 16x12 --spp 2 --bounces 2 --out truth.exr
+expect 0 reference cornell --size 16x12 --spp 2 --bounces 2 --out bounce.exr --image bounce-2
+expect 0 render cornell "${small[@]}" --size 16x12 --out radiance.exr --image radiance
+expect 0 compare truth.exr bounce.exr --image bounce-2 --max-max 0
+expect 0 compare bounce.exr truth.exr --image bounce-2 --max-max 0
+expect 1 compare bounce.exr truth.exr --image bounce-1 --max-max 0
+expect 0 compare radiance.exr truth.exr
+cp out main_image
+expect 0 compare radiance.exr truth.exr --image radiance
+cmp -s out main_image || fail 'the main image of a reference is its radiance'
+refused 'it has radiance, bounce-1, bounce-2, direct-error, direct' compare bounce.exr truth.exr --image bounce-3
+refused 'the name is empty' compare bounce.exr truth.exr --image ''
+
 expect 0 render cornell "${small[@]}" --size 32x48 --out other.exr --image direct
 refused 'equal sizes' compare a.exr other.exr
 refused 'two images' compare a.exr
@@ -197,8 +268,13 @@ refused 'letter.glb' compare letter.glb a.exr
 refused 'empty.glb' compare a.exr empty.glb
 head -c 200 a.exr >cut.exr
 refused 'cut.exr' compare a.exr cut.exr
-refused '--max-rmse' compare a.exr b.exr --max-rmse small
-refused 'unknown option' compare a.exr b.exr --max-flop 1
+refused '--max-rmse small' compare a.exr b.exr --max-rmse small
+refused 'value must follow' compare a.exr b.exr --max-rmse
+refused 'did you mean --max-flip' compare a.exr b.exr --max-flop 1
+refused 'did you mean --diff' compare a.exr b.exr --dif x.png
+refused 'signed, flip' compare a.exr b.exr --map heat
+refused '--scale 0' compare a.exr b.exr --scale 0
+refused '--threads 0' compare a.exr b.exr --threads 0
 refused 'no directory' compare a.exr b.exr --diff nowhere/d.png
 refused 'must end in' compare a.exr b.exr --diff d.txt
 
