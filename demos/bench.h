@@ -89,8 +89,14 @@ typedef struct bench_child {
  * could not be started. The caller frees output. */
 bench_child bench_run_child(const char* const* arguments, const char* variable, const char* value, bool quiet);
 
-/* bench_peer.c: llvmpipe's program from the folder of peers, built into a temporary folder */
+/* bench_peer.c: programs from the folder of peers, built into a temporary folder, that print rows of figures */
+typedef enum bench_peer_kind {
+    BENCH_LLVMPIPE,    /* its programs for drawing, shading and starting */
+    BENCH_EMBREE_RAYS, /* building and tracing rays: rows as "primary intersect1 70k" */
+    BENCH_EMBREE_PATHS /* one diffuse bounce by path tracing, demos/bench_embree_peer.c; to be run by bench_embree_paths */
+} bench_peer_kind;
 typedef struct bench_peer {
+    bench_peer_kind kind;
     char folder[DEMO_PATH_SIZE]; /* of the peers' sources; "" when there are none */
     char build[DEMO_PATH_SIZE];  /* temporary; "" when nothing is built */
     char why[200];               /* why there is no peer */
@@ -98,14 +104,30 @@ typedef struct bench_peer {
         char name[96];
         double values[64];
         size_t count;
-    } rows[64];
+    } rows[128];
     size_t row_count;
 } bench_peer;
-/* False with `why` when the peers are absent or cannot be built. */
-bool bench_peer_open(bench_peer* peer, bool build);
-void bench_peer_run(bench_peer* peer);
+/* False with `why` when the peers are absent or cannot be built. Large: from the heap. Closing is due in either case. */
+bool bench_peer_open(bench_peer* peer, bench_peer_kind kind, bool build);
+/* Once more; `threads` is what the peer may use. False with `why` when it fails. */
+bool bench_peer_run(bench_peer* peer, uint32_t threads);
 void bench_peer_close(bench_peer* peer);
 double bench_peer_value(bench_peer* peer, const char* name); /* median over the runs; NaN */
+/* One program of the kind, with its arguments (NULL at their end, at most six); `threads` for a kind that takes them by the environment. */
+bool bench_peer_run_program(bench_peer* peer, size_t program, const char* const* arguments, const char* threads);
+
+/* bench_embree.c: Embree's path tracer of the room's indirect light (70k triangles, 1024 × 768, one bounce, R2 sequence), time against
+ * error. Seconds leave out the primary rays, whose own are `primary_seconds`, and building the hierarchy. */
+typedef struct bench_path_point {
+    uint32_t samples;                          /* a pixel: 1, 2, 4 … */
+    double seconds, relrmse, rell1;            /* without filter */
+    double box_seconds, box_relrmse, box_rell1; /* after its geometry-aware box of 8 × 8, which takes part in the seconds */
+} bench_path_point;
+/* Once more, doubling the samples until relrmse is below 0.05 or the next doubling would end after `limit` seconds; `reference` is float RGB of
+ * 1024 × 768 (room_indirect_reference.exr). False with peer->why when it fails. */
+bool bench_embree_paths(bench_peer* peer, const es_image* reference, uint32_t threads, double limit);
+/* Medians over the runs so far; how many points there are. */
+size_t bench_embree_path_points(bench_peer* peer, bench_path_point* points, size_t capacity, double* primary_seconds);
 
 /* bench_speed.c, bench_errors.c */
 int bench_speed(const bench_options* options);

@@ -1,5 +1,5 @@
-/* llvmpipe, Mesa's software renderer: what one would use instead. Its program comes from the folder of peers beside the
- * repository (or where EARTHSHINE_SHARED points), is built here and run in the same sitting. */
+/* The peers: what one would use instead. Their programs come from the folder of peers beside the repository (or where
+ * EARTHSHINE_SHARED points), are built here and run in the same sitting. */
 #include "bench.h"
 #include "demo_build.h"
 
@@ -8,51 +8,91 @@
 #include <string.h>
 #include <unistd.h>
 
+typedef struct peer_program {
+    const char* name;
+    const char* source; /* in the kind's folder, or below demos/ when `ours` */
+    bool ours;
+} peer_program;
+
+enum { MAX_PROGRAMS = 2, MAX_FLAGS = 8 };
+typedef struct peer_kind {
+    const char *name, *folder, *probe; /* for people; below peers/; a file that must be there */
+    peer_program programs[MAX_PROGRAMS];
+    const char* flags[MAX_FLAGS];
+    const char* libraries[MAX_FLAGS];
+    const char *variable, *argument; /* the environment variable that takes the threads, else they follow the argument */
+} peer_kind;
+
+/* Flags as in the peers' own run.sh. */
+static const peer_kind kinds[] = {
+    [BENCH_LLVMPIPE] = {"llvmpipe", "llvmpipe", "gl_peer.c", {{"gl_peer", "gl_peer.c", false}, {"start_peer", "bench_start_peer.c", true}}, {"-O2"}, {"-lEGL", "-lGL", "-lm"},
+        "LP_NUM_THREADS", "all"},
+    [BENCH_EMBREE_RAYS] = {"Embree", "embree", "embree_peer.c", {{"embree_peer", "embree_peer.c", false}}, {"-O3", "-march=native", "-ffast-math"}, {"-lembree3", "-lpthread", "-lm"},
+        NULL, "rays"},
+    [BENCH_EMBREE_PATHS] = {"Embree", "embree", "embree_peer.c", {{"embree_paths", "bench_embree_peer.c", true}}, {"-O3", "-march=native", "-ffast-math"},
+        {"-lembree3", "-lpthread", "-lm"}, NULL, NULL},
+};
+
 static bool try_folder(bench_peer* peer, const char* shared)
 {
+    const peer_kind* kind = &kinds[peer->kind];
     char source[DEMO_PATH_SIZE + 64];
     snprintf(peer->folder, sizeof peer->folder, "%s/peers", shared);
-    snprintf(source, sizeof source, "%s/llvmpipe/gl_peer.c", peer->folder);
+    snprintf(source, sizeof source, "%s/%s/%s", peer->folder, kind->folder, kind->probe);
     if (access(source, R_OK) == 0) return true;
     peer->folder[0] = 0;
     return false;
 }
 
-static bool compile(bench_peer* peer, const char* source, const char* program)
+static void program_path(const bench_peer* peer, const peer_program* program, char path[DEMO_PATH_SIZE + 32])
 {
-    char from[2 * DEMO_PATH_SIZE], to[2 * DEMO_PATH_SIZE], include[2 * DEMO_PATH_SIZE];
-    snprintf(from, sizeof from, "%s", source);
-    snprintf(to, sizeof to, "%s/%s", peer->build, program);
-    snprintf(include, sizeof include, "-I%s/llvmpipe", peer->folder);
-    const char* arguments[] = {"gcc", "-O2", "-w", include, "-o", to, from, "-lEGL", "-lGL", "-lm", NULL};
+    snprintf(path, DEMO_PATH_SIZE + 32, "%s/%s", peer->build, program->name);
+}
+
+static bool compile(const bench_peer* peer, const peer_program* program)
+{
+    const peer_kind* kind = &kinds[peer->kind];
+    char from[2 * DEMO_PATH_SIZE], to[DEMO_PATH_SIZE + 32], include[2 * DEMO_PATH_SIZE];
+    if (program->ours)
+        snprintf(from, sizeof from, "%s/demos/%s", DEMO_SOURCE_DIR, program->source);
+    else
+        snprintf(from, sizeof from, "%s/%s/%s", peer->folder, kind->folder, program->source);
+    program_path(peer, program, to);
+    snprintf(include, sizeof include, "-I%s/%s", peer->folder, kind->folder);
+    const char* arguments[8 + 2 * MAX_FLAGS] = {"gcc", "-w", include, "-o", to};
+    size_t count = 5;
+    for (size_t i = 0; i < MAX_FLAGS && kind->flags[i]; i++) arguments[count++] = kind->flags[i];
+    arguments[count++] = from;
+    for (size_t i = 0; i < MAX_FLAGS && kind->libraries[i]; i++) arguments[count++] = kind->libraries[i];
     bench_child child = bench_run_child(arguments, NULL, NULL, true);
     free(child.output);
     return child.status == 0;
 }
 
-bool bench_peer_open(bench_peer* peer, bool build)
+bool bench_peer_open(bench_peer* peer, bench_peer_kind which, bool build)
 {
-    *peer = (bench_peer){0};
+    memset(peer, 0, sizeof *peer);
+    peer->kind = which;
+    const peer_kind* kind = &kinds[which];
     const char* shared = getenv("EARTHSHINE_SHARED");
     if (!(shared && shared[0] ? try_folder(peer, shared)
                               : try_folder(peer, DEMO_SOURCE_DIR "/../shared") || try_folder(peer, "../shared"))) {
-        snprintf(peer->why, sizeof peer->why, "no peers: neither EARTHSHINE_SHARED nor ../shared holds peers/llvmpipe");
+        snprintf(peer->why, sizeof peer->why, "no peers: neither EARTHSHINE_SHARED nor ../shared holds peers/%s", kind->folder);
         return false;
     }
     if (!build) {
         snprintf(peer->why, sizeof peer->why, "left out with --no-peer");
         return false;
     }
-    char source[DEMO_PATH_SIZE + 64];
     const char* temporary = getenv("TMPDIR");
     snprintf(peer->build, sizeof peer->build, "%s/earthshine-peer-XXXXXX", temporary && temporary[0] ? temporary : "/tmp");
-    snprintf(source, sizeof source, "%s/llvmpipe/gl_peer.c", peer->folder);
-    if (mkdtemp(peer->build) && compile(peer, source, "gl_peer")) {
-        compile(peer, DEMO_SOURCE_DIR "/demos/bench_start_peer.c", "start_peer");
+    if (!mkdtemp(peer->build)) peer->build[0] = 0;
+    if (peer->build[0] && compile(peer, &kind->programs[0])) {
+        for (size_t i = 1; i < MAX_PROGRAMS && kind->programs[i].name; i++) compile(peer, &kind->programs[i]);
         return true;
     }
     snprintf(peer->why, sizeof peer->why,
-        "llvmpipe's program could not be built; `demos/install-packages bench` installs what it needs");
+        "%s's program could not be built; `demos/install-packages bench` installs what it needs", kind->name);
     return false;
 }
 
@@ -82,21 +122,31 @@ static void take_rows(bench_peer* peer, char* output)
     }
 }
 
-void bench_peer_run(bench_peer* peer)
+bool bench_peer_run_program(bench_peer* peer, size_t program, const char* const* arguments, const char* threads)
 {
-    static const char* const programs[] = {"gl_peer", "start_peer"};
-    for (int i = 0; i < 2; i++) {
-        char path[DEMO_PATH_SIZE + 32];
-        snprintf(path, sizeof path, "%s/%s", peer->build, programs[i]);
-        const char* arguments[] = {path, "all", NULL};
-        if (!peer->build[0] || access(path, X_OK) != 0) continue;
-        bench_child child = bench_run_child(arguments, "LP_NUM_THREADS", "2", true);
-        if (child.status == 0 && child.output)
-            take_rows(peer, child.output);
-        else
-            snprintf(peer->why, sizeof peer->why, "llvmpipe's program ended with %d", child.status);
-        free(child.output);
-    }
+    char path[DEMO_PATH_SIZE + 32];
+    const peer_kind* kind = &kinds[peer->kind];
+    const char* all[8] = {path};
+    for (size_t i = 0; i < 6 && arguments[i]; i++) all[i + 1] = arguments[i];
+    program_path(peer, &kind->programs[program], path);
+    if (!peer->build[0] || access(path, X_OK) != 0) return false;
+    bench_child child = bench_run_child(all, kind->variable, threads, true);
+    if (child.status == 0 && child.output)
+        take_rows(peer, child.output);
+    else
+        snprintf(peer->why, sizeof peer->why, "%s's program ended with %d", kind->name, child.status);
+    free(child.output);
+    return child.status == 0;
+}
+
+bool bench_peer_run(bench_peer* peer, uint32_t threads)
+{
+    char thread_text[16];
+    snprintf(thread_text, sizeof thread_text, "%u", threads);
+    const char* arguments[] = {kinds[peer->kind].argument, kinds[peer->kind].variable ? NULL : thread_text, NULL};
+    bool works = true;
+    for (size_t i = 0; i < MAX_PROGRAMS && kinds[peer->kind].programs[i].name; i++) works &= bench_peer_run_program(peer, i, arguments, thread_text);
+    return works;
 }
 
 double bench_peer_value(bench_peer* peer, const char* name)
@@ -108,10 +158,9 @@ double bench_peer_value(bench_peer* peer, const char* name)
 
 void bench_peer_close(bench_peer* peer)
 {
-    static const char* const programs[] = {"gl_peer", "start_peer"};
-    for (int i = 0; i < 2 && peer->build[0]; i++) {
+    for (size_t i = 0; i < MAX_PROGRAMS && peer->build[0] && kinds[peer->kind].programs[i].name; i++) {
         char path[DEMO_PATH_SIZE + 32];
-        snprintf(path, sizeof path, "%s/%s", peer->build, programs[i]);
+        program_path(peer, &kinds[peer->kind].programs[i], path);
         unlink(path);
     }
     if (peer->build[0]) rmdir(peer->build);

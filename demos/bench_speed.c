@@ -410,14 +410,14 @@ int bench_speed(const bench_options* options)
         if (context) es_context_destroy(context);
         return demo_refuse("out of memory");
     }
-    bool with_peer = bench_peer_open(peer, peer_wanted && !options->no_peer);
+    bool with_peer = bench_peer_open(peer, BENCH_LLVMPIPE, peer_wanted && !options->no_peer);
     if (!with_peer && peer_wanted) fprintf(stderr, "earthshine: %s\n", peer->why);
     for (uint32_t round = 0; round < options->runs; round++) {
         fprintf(stderr, "round %u of %u\n", round + 1, options->runs);
         drawing_round(options, g);
         frame_round(options, g);
         process_round(options, g);
-        if (with_peer) bench_peer_run(peer);
+        if (with_peer) bench_peer_run(peer, 2);
     }
     fill_rows(g, peer, all, all_count);
     bench_measure_errors(options, peer, all, all_count);
