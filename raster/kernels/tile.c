@@ -8,9 +8,10 @@
 #include "raster/kernels/texture_sampling.h"
 #include "platform/simd.h"
 
-/* Returns the depth left there. */
-VINL vf put(float* depth, uint32_t* numbers, vm covered, vf z, vi number, bool numbered)
+/* Eight pixels from `at` on; there are no numbers unless `numbered`. Returns the depth left there. */
+VINL vf put(float* depth, uint32_t* numbers, uint32_t at, vm covered, vf z, vi number, bool numbered)
 {
+    depth += at;
     vf old = vf_load(depth);
     if (!numbered) {
         vf left = vf_max(vf_and(covered, z), old);
@@ -20,7 +21,7 @@ VINL vf put(float* depth, uint32_t* numbers, vm covered, vf z, vi number, bool n
     vm wins = covered & vm_gt(z, old);
     vf left = vf_select(wins, z, old);
     vf_store(depth, left);
-    vi_store(numbers, vi_select(wins, number, vi_load(numbers)));
+    vi_store(numbers + at, vi_select(wins, number, vi_load(numbers + at)));
     return left;
 }
 
@@ -99,7 +100,7 @@ VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered)
                 vf d = z;
                 uint32_t at = start;
                 for (int32_t row = s.rows[t]; row > 0; row--) {
-                    put(depth + at, numbers + at, vi_gt(f0 | f1 | f2, vi_set1(-1)), vf_clamp(d, low, high), number, numbered);
+                    put(depth, numbers, at, vi_gt(f0 | f1 | f2, vi_set1(-1)), vf_clamp(d, low, high), number, numbered);
                     f0 += b0;
                     f1 += b1;
                     f2 += b2;
@@ -286,7 +287,7 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* m
             vf least = vf_set1(2.0f);
             if (!mask && (inside_bits >> bx & 1)) {
                 for (int row = 0; row < 8; row++, at += ES_TILE_PITCH) {
-                    least = vf_min(least, put(depth + at, numbers + at, vm_all_lanes(), vf_clamp(z, low, high), number, numbered));
+                    least = vf_min(least, put(depth, numbers, at, vm_all_lanes(), vf_clamp(z, low, high), number, numbered));
                     z += zy;
                 }
             } else {
@@ -298,7 +299,7 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* m
                         covered &= vm_gt(d, vf_load(depth + at));
                         if (vm_any(covered)) covered = alpha_passes(tile, mask, 8 * bx, 8 * by + row, covered);
                     }
-                    least = vf_min(least, put(depth + at, numbers + at, covered, d, number, numbered));
+                    least = vf_min(least, put(depth, numbers, at, covered, d, number, numbered));
                     f0 += b0;
                     f1 += b1;
                     f2 += b2;
