@@ -178,7 +178,8 @@ ES_API es_result es_reference_image(es_reference* reference, const char* name, e
 ES_API bool es_reference_has_image(uint32_t bounces, const char* name);
 /* Writes an EXR whose R, G, B are the radiance; further channels hold the other images and the accumulators. */
 ES_API es_result es_reference_save(es_reference* reference, const char* path);
-/* After es_reference_begin: goes on where the file stopped. FILE_UNSUPPORTED when it was made from another world, camera or settings. */
+/* After es_reference_begin: goes on where the file stopped. FILE_UNSUPPORTED when it was made from another world, camera or settings,
+ * FILE_DAMAGED when it lacks sums or they are no numbers; a file that is refused changes nothing. */
 ES_API es_result es_reference_resume(es_reference* reference, const char* path);
 
 /* ---- error: how far a picture is from the truth ------------------------------------------------------------------------------------ */

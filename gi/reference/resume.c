@@ -22,9 +22,9 @@ static void name_layer(es_image* file, uint32_t layer, const char* name)
     }
 }
 
-static void state_name(const es_reference* r, const char* what, uint32_t image, char name[NAME_SIZE])
+static void state_name(const es_reference* r, uint64_t samples, const char* what, uint32_t image, char name[NAME_SIZE])
 {
-    snprintf(name, NAME_SIZE, "state-%016" PRIx64 "-%" PRIu64 "-%u-%s", r->fingerprint, r->stats.samples, image, what);
+    snprintf(name, NAME_SIZE, "state-%016" PRIx64 "-%" PRIu64 "-%u-%s", r->fingerprint, samples, image, what);
 }
 
 static void put_layer(es_image* file, uint32_t layer, const float* values, size_t step)
@@ -59,15 +59,15 @@ static es_result fill(es_reference* r, es_image* file)
     if (result) return result;
     const size_t plane = value_count(r);
     for (uint32_t i = 0; i < es_reference_image_count(r); i++) {
-        state_name(r, "sum", i, name);
+        state_name(r, r->stats.samples, "sum", i, name);
         name_layer(file, layer, name);
         put_layer(file, layer++, &r->sums[i * plane].sum, sizeof *r->sums / sizeof(float));
-        state_name(r, "lost", i, name);
+        state_name(r, r->stats.samples, "lost", i, name);
         name_layer(file, layer, name);
         put_layer(file, layer++, &r->sums[i * plane].lost, sizeof *r->sums / sizeof(float));
     }
     for (uint32_t i = 0; i < es_reference_square_count(r); i++) {
-        state_name(r, "square", i, name);
+        state_name(r, r->stats.samples, "square", i, name);
         name_layer(file, layer, name);
         put_layer(file, layer++, &r->squares[i * plane], 1);
     }
@@ -107,34 +107,70 @@ static bool read_origin(const es_image* file, uint64_t* fingerprint, uint64_t* s
     return false;
 }
 
-static bool get_layer(const es_image* file, const char* name, float* values, size_t step)
+/* The channel of each value of a layer; false when one is missing. */
+static bool find_layer(const es_image* file, const char* name, int channel[3])
 {
-    size_t pixels = (size_t)file->width * file->height;
     for (int k = 0; k < 3; k++) {
         char channel_name[NAME_SIZE];
         snprintf(channel_name, sizeof channel_name, "%.*s.%c", NAME_SIZE - 3, name, rgb[k]);
-        int channel = es_image_channel(file, channel_name);
-        if (channel < 0) return false;
-        for (size_t i = 0; i < pixels; i++) values[(i * 3 + (size_t)k) * step] = file->pixels[i * file->channels + (size_t)channel];
+        channel[k] = es_image_channel(file, channel_name);
+        if (channel[k] < 0) return false;
     }
     return true;
 }
 
-static bool get_state(es_reference* r, const es_image* file)
+/* What is summed is never negative. Squares may be infinite, where one was beyond the largest float. */
+static bool sums_valid(const es_image* file, const int sum[3], const int lost[3])
 {
-    char name[NAME_SIZE];
+    const float* pixel = file->pixels;
+    for (size_t i = 0; i < (size_t)file->width * file->height; i++, pixel += file->channels)
+        for (int k = 0; k < 3; k++) {
+            float s = pixel[sum[k]], all = s + pixel[lost[k]];
+            if (!(s >= 0.0f && all >= 0.0f && all <= 0x1.fffffep127f && s <= 0x1.fffffep127f)) return false;
+        }
+    return true;
+}
+
+static bool squares_valid(const es_image* file, const int square[3])
+{
+    const float* pixel = file->pixels;
+    for (size_t i = 0; i < (size_t)file->width * file->height; i++, pixel += file->channels)
+        for (int k = 0; k < 3; k++)
+            if (!(pixel[square[k]] >= 0.0f)) return false;
+    return true;
+}
+
+static void get_layer(const es_image* file, const int channel[3], float* values, size_t step)
+{
+    size_t pixels = (size_t)file->width * file->height;
+    for (size_t i = 0; i < pixels; i++)
+        for (int k = 0; k < 3; k++) values[(i * 3 + (size_t)k) * step] = file->pixels[i * file->channels + (size_t)channel[k]];
+}
+
+/* What is wrong with the file's sums of so many samples, or NULL; with `keep` they become the reference's. */
+static const char* visit_state(es_reference* r, const es_image* file, uint64_t samples, bool keep)
+{
+    static const char missing[] = "some of its sums are missing", wrong[] = "its sums are those of no samples";
     const size_t plane = value_count(r), step = sizeof *r->sums / sizeof(float);
+    char name[NAME_SIZE];
+    int sum[3], lost[3], square[3];
     for (uint32_t i = 0; i < es_reference_image_count(r); i++) {
-        state_name(r, "sum", i, name);
-        if (!get_layer(file, name, &r->sums[i * plane].sum, step)) return false;
-        state_name(r, "lost", i, name);
-        if (!get_layer(file, name, &r->sums[i * plane].lost, step)) return false;
+        state_name(r, samples, "sum", i, name);
+        if (!find_layer(file, name, sum)) return missing;
+        state_name(r, samples, "lost", i, name);
+        if (!find_layer(file, name, lost)) return missing;
+        if (!sums_valid(file, sum, lost)) return wrong;
+        if (!keep) continue;
+        get_layer(file, sum, &r->sums[i * plane].sum, step);
+        get_layer(file, lost, &r->sums[i * plane].lost, step);
     }
     for (uint32_t i = 0; i < es_reference_square_count(r); i++) {
-        state_name(r, "square", i, name);
-        if (!get_layer(file, name, &r->squares[i * plane], 1)) return false;
+        state_name(r, samples, "square", i, name);
+        if (!find_layer(file, name, square)) return missing;
+        if (!squares_valid(file, square)) return wrong;
+        if (keep) get_layer(file, square, &r->squares[i * plane], 1);
     }
-    return true;
+    return NULL;
 }
 
 static es_result take(es_reference* r, const es_image* file, const char* path)
@@ -145,13 +181,11 @@ static es_result take(es_reference* r, const es_image* file, const char* path)
     if (fingerprint != r->fingerprint || file->width != r->width || file->height != r->height)
         return es_fail(r->context, ES_FILE_UNSUPPORTED,
             "'%s' cannot be resumed: it was made of another world, camera or settings (size, bounces, seed, antialias, emission, quantised)", path);
+    const char* wrong = visit_state(r, file, samples, false);
+    if (wrong) return es_fail(r->context, ES_FILE_DAMAGED, "'%s' cannot be resumed: %s", path, wrong);
     es_reference_forget(r);
-    r->stats.samples = samples;
-    if (!get_state(r, file)) {
-        es_reference_forget(r);
-        return es_fail(r->context, ES_FILE_DAMAGED, "'%s' cannot be resumed: some of its sums are missing", path);
-    }
-    r->resumed_samples = samples;
+    visit_state(r, file, samples, true);
+    r->stats.samples = r->resumed_samples = samples;
     es_reference_estimate(r);
     return ES_OK;
 }
@@ -162,7 +196,7 @@ es_result es_reference_resume(es_reference* r, const char* path)
     es_image file;
     es_result result = es_image_load(r->context, path, &file);
     if (result) return result;
-    es_fp_environment environment = es_fp_enter();
+    es_fp_environment environment = es_fp_enter_untrapped(); /* the file's numbers may be anything */
     result = take(r, &file, path);
     es_fp_leave(environment);
     es_image_destroy(r->context, &file);
