@@ -6,12 +6,14 @@
 
 int demo_refuse(const char* format, ...)
 {
+    char line[2048];
     va_list arguments;
     va_start(arguments, format);
-    fputs("earthshine: ", stderr);
-    vfprintf(stderr, format, arguments);
-    fputc('\n', stderr);
+    if (vsnprintf(line, sizeof line, format, arguments) < 0) line[0] = 0;
     va_end(arguments);
+    for (char* c = line; *c; c++)
+        if ((unsigned char)*c < ' ' || *c == 127) *c = '?'; /* one line, whatever an argument holds */
+    fprintf(stderr, "earthshine: %s\n", line);
     return DEMO_BAD_INPUT;
 }
 
