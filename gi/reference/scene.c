@@ -247,10 +247,10 @@ static es_result gather_emitters(es_trace_scene* scene)
     const es_bvh_primitive* primitives = es_bvh_primitives(scene->bvh);
     uint32_t n = es_bvh_primitive_count(scene->bvh), count = 0;
     for (uint32_t p = 0; p < n; p++) count += luminance(scene->materials[scene->instances[primitives[p].instance].material].emission) > 0.0f;
-    scene->emitters = es_allocate_array(scene->context, count, sizeof *scene->emitters);
-    scene->emitter_sums = es_allocate_array(scene->context, count, sizeof *scene->emitter_sums);
-    if (!scene->emitters || !scene->emitter_sums) return es_context_last_result(scene->context);
     scene->emitter_count = count;
+    bool all = (scene->emitters = es_allocate_array(scene->context, count, sizeof *scene->emitters)) &&
+        (scene->emitter_sums = es_allocate_array(scene->context, count, sizeof *scene->emitter_sums));
+    if (!all) return es_context_last_result(scene->context);
     for (int pass = 0; pass < 2; pass++) {
         double sum = 0.0;
         uint32_t at = 0;
@@ -282,9 +282,11 @@ static es_result sum_environment(es_trace_scene* scene)
 {
     const es_image* image = scene->environment.image;
     if (!image) return ES_OK;
-    scene->environment_rows = es_allocate_array(scene->context, image->height, sizeof(float));
-    scene->environment_columns = es_allocate_array(scene->context, (size_t)image->width * image->height, sizeof(float));
-    if (!scene->environment_rows || !scene->environment_columns) return es_context_last_result(scene->context);
+    scene->environment_height = image->height;
+    scene->environment_texels = (size_t)image->width * image->height;
+    bool all = (scene->environment_rows = es_allocate_array(scene->context, scene->environment_height, sizeof(float))) &&
+        (scene->environment_columns = es_allocate_array(scene->context, scene->environment_texels, sizeof(float)));
+    if (!all) return es_context_last_result(scene->context);
     double total = 0.0;
     for (int pass = 0; pass < 2; pass++) {
         double rows = 0.0;
@@ -357,10 +359,7 @@ void es_trace_scene_free(es_trace_scene* scene)
     es_release(context, scene->lights, scene->light_count * sizeof *scene->lights);
     es_release(context, scene->emitters, scene->emitter_count * sizeof *scene->emitters);
     es_release(context, scene->emitter_sums, scene->emitter_count * sizeof *scene->emitter_sums);
-    const es_image* image = scene->environment.image;
-    if (image) {
-        es_release(context, scene->environment_rows, image->height * sizeof(float));
-        es_release(context, scene->environment_columns, (size_t)image->width * image->height * sizeof(float));
-    }
+    es_release(context, scene->environment_rows, scene->environment_height * sizeof(float));
+    es_release(context, scene->environment_columns, scene->environment_texels * sizeof(float));
     *scene = (es_trace_scene){0};
 }

@@ -23,6 +23,8 @@ typedef struct es_trace_scene {
     bool has_environment;
     float* environment_rows;           /* running sums of luminance × solid angle: height rows, then width × height columns within their row */
     float* environment_columns;
+    uint32_t environment_height;       /* of those sums: the world's image may be another by the time they are freed */
+    size_t environment_texels;
 } es_trace_scene;
 
 /* From nothing (all zero), or again: then the hierarchy is refit where that will do. The world must stay as it is while the scene is used. emission: whether glowing surfaces and the environment are gathered. */
