@@ -136,10 +136,9 @@ static es_result reserve_lights(es_renderer* renderer, uint32_t count)
     if (count <= renderer->light_capacity) return ES_OK;
     es_context* context = renderer->context;
     es_light_view* views = es_allocate_zero(context, count * sizeof *views);
-    es_importance* importances = es_allocate_zero(context, count * sizeof *importances);
-    if (!views || !importances) {
+    es_importance* importances = views ? es_allocate_zero(context, count * sizeof *importances) : NULL;
+    if (!importances) {
         es_release(context, views, count * sizeof *views);
-        es_release(context, importances, count * sizeof *importances);
         return es_context_last_result(context);
     }
     if (renderer->light_capacity) {

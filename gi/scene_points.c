@@ -120,12 +120,10 @@ static es_result allocate_places(es_context* context, es_scene_points* points, u
     size_t total = (size_t)subset_size * subset_count;
     points->subset_size = subset_size;
     points->subset_count = subset_count;
-    points->x = es_allocate_array(context, total, sizeof(float));
-    points->y = es_allocate_array(context, total, sizeof(float));
-    points->z = es_allocate_array(context, total, sizeof(float));
-    points->triangle = es_allocate_array(context, total, sizeof(uint32_t));
-    points->barycentric = es_allocate_array(context, total, sizeof(uint32_t));
-    if (points->x && points->y && points->z && points->triangle && points->barycentric) return ES_OK;
+    bool all = (points->x = es_allocate_array(context, total, sizeof(float))) && (points->y = es_allocate_array(context, total, sizeof(float))) &&
+        (points->z = es_allocate_array(context, total, sizeof(float))) && (points->triangle = es_allocate_array(context, total, sizeof(uint32_t))) &&
+        (points->barycentric = es_allocate_array(context, total, sizeof(uint32_t)));
+    if (all) return ES_OK;
     free_places(context, points);
     return es_context_last_result(context);
 }
@@ -138,9 +136,9 @@ static es_result distribute(es_context* context, es_scene_points* points, const 
     es_arena_init(&scratch, context, 1 << 20);
     es_result result = ES_OK;
     uint64_t* first_triangle = es_arena_allocate(&scratch, ((size_t)list->instance_count + 1) * sizeof *first_triangle);
-    double* area_before = es_arena_allocate(&scratch, (triangle_total + 1) * sizeof *area_before);
-    uint32_t* instance_of_point = es_arena_allocate(&scratch, (size_t)subset_size * subset_count * sizeof *instance_of_point);
-    if (!first_triangle || !area_before || !instance_of_point) result = es_context_last_result(context);
+    double* area_before = first_triangle ? es_arena_allocate(&scratch, (triangle_total + 1) * sizeof *area_before) : NULL;
+    uint32_t* instance_of_point = area_before ? es_arena_allocate(&scratch, (size_t)subset_size * subset_count * sizeof *instance_of_point) : NULL;
+    if (!instance_of_point) result = es_context_last_result(context);
     if (!result) {
         double sum = 0.0;
         uint64_t first = 0;

@@ -72,8 +72,8 @@ es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job
 {
     const uint32_t n = job->interleave, width = job->gbuffer->width, height = job->gbuffer->height;
     es_shade_light* lights = es_arena_allocate(arena, ((size_t)job->vpl_count + 1) * sizeof *lights);
-    es_shade_batch* batches = es_arena_allocate(arena, (size_t)es_context_workers(context) * sizeof *batches);
-    if (!lights || !batches) return es_context_last_result(context);
+    es_shade_batch* batches = lights ? es_arena_allocate(arena, (size_t)es_context_workers(context) * sizeof *batches) : NULL;
+    if (!batches) return es_context_last_result(context);
     for (uint32_t v = 0; v < job->vpl_count; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread, job->lobe_roughness);
 
     shade_loop loop = {.job = job, .lights = lights, .batches = batches, .kernels = es_gi_kernel_table(es_context_isa(context))};

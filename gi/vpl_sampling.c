@@ -148,8 +148,8 @@ static es_result weigh_by_view(es_context* context, es_importance* importance, c
     es_arena scratch;
     es_arena_init(&scratch, context, 1 << 16);
     job.factor = es_arena_allocate(&scratch, (size_t)rows * blocks * sizeof *job.factor);
-    job.sums = es_arena_allocate(&scratch, rows * sizeof *job.sums);
-    es_result result = job.factor && job.sums ? ES_OK : es_context_last_result(context);
+    job.sums = job.factor ? es_arena_allocate(&scratch, rows * sizeof *job.sums) : NULL;
+    es_result result = job.sums ? ES_OK : es_context_last_result(context);
     if (!result) {
         es_parallel_for(context, rows, 4, view_factor_rows, &job);
         double sum = 0.0, weighted = 0.0;
@@ -355,10 +355,9 @@ es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32
     if (!(total_power > 0.0) || !request->count) return ES_OK;
 
     uint32_t* shares = es_allocate_array(context, view_count, sizeof *shares);
-    uint32_t* next = es_allocate_array(context, view_count, sizeof *next);
-    if (!shares || !next) {
-        if (shares) es_release(context, shares, view_count * sizeof *shares);
-        if (next) es_release(context, next, view_count * sizeof *next);
+    uint32_t* next = shares ? es_allocate_array(context, view_count, sizeof *next) : NULL;
+    if (!next) {
+        es_release(context, shares, view_count * sizeof *shares);
         return es_context_last_result(context);
     }
     es_vpl_shares(views, view_count, importances, request->count, shares);

@@ -368,6 +368,7 @@ typedef struct unpacking {
     es_image* image;
     es_dwa_scratch* dwa;
     uint32_t x, y;  /* of the image, where the chunk begins */
+    bool no_memory; /* and the context has said so */
 } unpacking;
 
 static float sample_value(const uint8_t* p, exr_pixel_type_t type)
@@ -411,7 +412,7 @@ static exr_result_t unpack_chunk(exr_decode_pipeline_t* decode)
 
 static exr_result_t decompress_dwa(exr_decode_pipeline_t* decode)
 {
-    const unpacking* job = decode->decoding_user_data;
+    unpacking* job = decode->decoding_user_data;
     es_dwa_channel channels[ES_IMAGE_MAX_CHANNELS];
     for (int c = 0; c < job->plan->channels->num_channels; c++) {
         const exr_attr_chlist_entry_t* entry = job->plan->channels->entries + c;
@@ -425,7 +426,7 @@ static exr_result_t decompress_dwa(exr_decode_pipeline_t* decode)
     switch (es_dwa_decode(job->dwa, decode->packed_buffer, chunk->packed_size, channels, (uint32_t)job->plan->channels->num_channels,
         (uint32_t)chunk->width, (uint32_t)chunk->height, chunk->start_y, decode->unpacked_buffer, chunk->unpacked_size)) {
     case ES_DWA_OK: return EXR_ERR_SUCCESS;
-    case ES_DWA_NO_MEMORY: return EXR_ERR_OUT_OF_MEMORY;
+    case ES_DWA_NO_MEMORY: job->no_memory = true; return EXR_ERR_OUT_OF_MEMORY;
     default: return EXR_ERR_CORRUPT_CHUNK;
     }
 }
@@ -498,6 +499,7 @@ static es_result decode_chunks(exr_reader* reader, unpacking* job, const chunk_b
         decode.packed_alloc_size = decode.unpacked_alloc_size = decode.scratch_alloc_size_1 = 0;
         exr_decoding_destroy(reader->file, &decode);
     }
+    if (job->no_memory) return es_context_last_result(reader->context);
     return code == EXR_ERR_SUCCESS ? ES_OK : fail_read(reader, code, "damaged OpenEXR pixels");
 }
 
@@ -689,6 +691,7 @@ typedef struct exr_writer {
     uint32_t sample_size;
     uint8_t* rows;  /* one chunk's samples, channel after channel */
     size_t rows_size;
+    bool no_memory; /* and the context has said so */
 } exr_writer;
 
 /* A write context is locked while it reports, so nothing may be asked of it here; the code says enough. */
@@ -726,7 +729,10 @@ static exr_result_t write_chunks(exr_writer* writer)
     size_t plane = (size_t)image->width * (size_t)lines * writer->sample_size;
     writer->rows_size = plane * image->channels;
     writer->rows = es_allocate(writer->context, writer->rows_size);
-    if (!writer->rows) return EXR_ERR_OUT_OF_MEMORY;
+    if (!writer->rows) {
+        writer->no_memory = true;
+        return EXR_ERR_OUT_OF_MEMORY;
+    }
     for (uint32_t y = 0; y < image->height && code == EXR_ERR_SUCCESS; y += (uint32_t)lines) {
         exr_chunk_info_t chunk;
         if ((code = exr_write_scanline_chunk_info(writer->file, 0, (int)y, &chunk)) != EXR_ERR_SUCCESS) break;
@@ -795,13 +801,10 @@ es_result es_image_write_exr(es_context* context, const es_image* image, const e
         exr_result_t finished = exr_finish(&writer.file);  /* writes the chunk table */
         if (code == EXR_ERR_SUCCESS) code = finished;
     }
+    if (writer.no_memory) return es_context_last_result(context);
     if (es_sink_failed(sink)) return ES_FILE_WRITE;
     if (code == EXR_ERR_SUCCESS) return ES_OK;
-    if (code == EXR_ERR_OUT_OF_MEMORY) {
-        es_result last = es_context_last_result(context);
-        if (last == ES_OUT_OF_MEMORY || last == ES_MEMORY_CAP) return last;
-        return es_fail(context, ES_OUT_OF_MEMORY, "cannot write '%s': out of memory", label);
-    }
+    if (code == EXR_ERR_OUT_OF_MEMORY) return es_fail(context, ES_OUT_OF_MEMORY, "cannot write '%s': out of memory", label);
     return es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", label, exr_get_default_error_message(code));
 }
 

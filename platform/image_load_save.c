@@ -176,7 +176,7 @@ static es_result write_file(es_context* context, const es_image* image, const ch
     errno = 0;
     if (fclose(sink.file) != 0 && !sink.error) sink.error = errno ? errno : EIO;
     if (result == ES_OK && !sink.error && rename(temporary, path) != 0) sink.error = errno ? errno : EIO;
-    if (sink.error) result = es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", path, system_reason(sink.error));
+    if (sink.error && (result == ES_OK || result == ES_FILE_WRITE)) result = es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", path, system_reason(sink.error));
     if (result != ES_OK) unlink(temporary);
     return result;
 }

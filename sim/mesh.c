@@ -119,8 +119,9 @@ static bool fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc
     mesh->raster.triangle_count = desc->triangle_count;
     mesh->raster.revision = es_context_next_serial(world->context);
     mesh->positions = es_allocate(context, bytes);
+    if (!mesh->positions) return false;
     mesh->indices = es_allocate(context, index_bytes(desc->triangle_count));
-    if (!mesh->positions || !mesh->indices) return false;
+    if (!mesh->indices) return false;
     write_stream(mesh->positions, desc->positions, 3, position, count);
     if (desc->triangle_count) memcpy(mesh->indices, desc->indices, (size_t)desc->triangle_count * 3 * sizeof(uint32_t));
     mesh->indices[(size_t)desc->triangle_count * 3] = 0;

@@ -9,6 +9,15 @@ static const float two_pi = 6.2831853f;
 
 es_shape es_shape_begin(es_context* context) { return (es_shape){.context = context}; }
 
+static bool stopped(const es_shape* shape) { return shape->failed || (shape->stop && *shape->stop != ES_OK); }
+
+/* The context has said what failed. */
+static void fail(es_shape* shape)
+{
+    shape->failed = true;
+    if (shape->stop) *shape->stop = es_context_last_result(shape->context);
+}
+
 void es_shape_free(es_shape* shape)
 {
     es_release(shape->context, shape->positions, shape->position_capacity * sizeof(float));
@@ -20,7 +29,7 @@ void es_shape_free(es_shape* shape)
 es_result es_shape_add_mesh(es_shape* shape, es_world* world, const char* name, es_mesh* mesh)
 {
     es_result result = es_context_last_result(shape->context);
-    if (!shape->failed) {
+    if (!stopped(shape)) {
         es_mesh_desc desc = {.name = name, .vertex_count = (uint32_t)shape->vertex_count, .triangle_count = (uint32_t)shape->triangle_count,
             .positions = shape->positions, .normals = shape->normals, .indices = shape->indices};
         result = es_world_add_mesh(world, &desc, mesh);
@@ -32,10 +41,15 @@ es_result es_shape_add_mesh(es_shape* shape, es_world* world, const char* name, 
 uint32_t es_shape_vertex(es_shape* shape, es_vec3 position, es_vec3 normal)
 {
     size_t used = 3 * shape->vertex_count;
-    if (shape->failed || used > 3 * ((size_t)1 << 28) ||
-        !es_grow(shape->context, (void**)&shape->positions, &shape->position_capacity, used, used + 3, sizeof(float)) ||
+    if (stopped(shape)) return 0;
+    if (used > 3 * ((size_t)1 << 28)) {
+        es_fail(shape->context, ES_INVALID_ARGUMENT, "a shape has at most 2^28 vertices");
+        fail(shape);
+        return 0;
+    }
+    if (!es_grow(shape->context, (void**)&shape->positions, &shape->position_capacity, used, used + 3, sizeof(float)) ||
         !es_grow(shape->context, (void**)&shape->normals, &shape->normal_capacity, used, used + 3, sizeof(float))) {
-        shape->failed = true;
+        fail(shape);
         return 0;
     }
     memcpy(shape->positions + used, &position, sizeof position);
@@ -49,11 +63,11 @@ static bool same(es_vec3 a, es_vec3 b) { return a.x == b.x && a.y == b.y && a.z 
 void es_shape_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c)
 {
     size_t used = 3 * shape->triangle_count;
-    if (shape->failed) return;
+    if (stopped(shape)) return;
     es_vec3 pa = at(shape->positions, a), pb = at(shape->positions, b), pc = at(shape->positions, c);
     if (!shape->keep_degenerate && (same(pa, pb) || same(pb, pc) || same(pc, pa))) return;
     if (!es_grow(shape->context, (void**)&shape->indices, &shape->index_capacity, used, used + 3, sizeof(uint32_t))) {
-        shape->failed = true;
+        fail(shape);
         return;
     }
     es_vec3 n = es_v3_add(es_v3_add(at(shape->normals, a), at(shape->normals, b)), at(shape->normals, c));

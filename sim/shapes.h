@@ -15,6 +15,7 @@ typedef struct es_shape {
     size_t position_capacity, normal_capacity, index_capacity;
     bool keep_degenerate;        /* triangles with two equal corners (at poles) are left out unless this is set */
     bool failed;                 /* memory ran out; what follows does nothing */
+    es_result* stop;             /* NULL, or what several shapes share: the first to fail writes its result there and stops all */
 } es_shape;
 
 es_shape es_shape_begin(es_context* context);

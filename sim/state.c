@@ -16,6 +16,7 @@ typedef struct state_io {
     size_t at, size;    /* size: CHECK, APPLY */
     uint64_t hash;
     bool good;
+    bool no_memory;     /* and the context has said so */
 } state_io;
 
 static bool reading(const state_io* io) { return io->mode >= CHECK; }
@@ -161,6 +162,7 @@ static void visit_mesh(es_world* world, state_io* io, es_mesh_object* mesh)
     }
     if (reading(io) && deformed && !es_mesh_make_deformable(world, mesh)) {
         io->good = false;
+        io->no_memory = true;
         return;
     }
     if (io->mode == APPLY && mesh->deformed && !deformed) {
@@ -295,11 +297,8 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     if (header.payload != es_hash_bytes(0, payload, payload_size)) return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
     state_io io = {.mode = CHECK, .bytes = payload, .size = payload_size, .good = true};
     visit_world(world, &io);
-    if (!io.good || io.at != payload_size) {
-        es_result last = es_context_last_result(context);
-        if (last == ES_OUT_OF_MEMORY || last == ES_MEMORY_CAP) return last;
-        return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
-    }
+    if (io.no_memory) return es_context_last_result(context);
+    if (!io.good || io.at != payload_size) return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
     io = (state_io){.mode = APPLY, .bytes = payload, .size = payload_size, .good = true};
     visit_world(world, &io);
     es_world_refresh(world);

@@ -102,9 +102,9 @@ static es_result begin(es_flicker* f, const es_image* a, uint32_t channels)
 {
     f->height = a->height;
     f->bytes = (size_t)a->width * a->height * channels * sizeof(float);
-    for (int i = 0; i < 2; i++) f->last[i] = es_allocate(f->context, f->bytes);
-    f->rows = es_allocate_array(f->context, a->height, sizeof *f->rows);
-    if (!f->last[0] || !f->last[1] || !f->rows) {
+    bool all = (f->last[0] = es_allocate(f->context, f->bytes)) && (f->last[1] = es_allocate(f->context, f->bytes)) &&
+        (f->rows = es_allocate_array(f->context, a->height, sizeof *f->rows));
+    if (!all) {
         free_frames(f);
         return es_context_last_result(f->context);
     }

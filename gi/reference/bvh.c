@@ -14,8 +14,10 @@ es_result es_bvh_create(es_context* context, es_bvh** out)
     if (!bvh) return es_context_last_result(context);
     bvh->context = context;
     es_context_count_object(context, 1);
-    *out = bvh;
-    return es_bvh_build(bvh, &(es_draw_list){0});
+    es_result result = es_bvh_build(bvh, &(es_draw_list){0});
+    if (result) es_bvh_destroy(bvh);
+    else *out = bvh;
+    return result;
 }
 
 static void free_content(es_bvh* bvh)
@@ -101,17 +103,16 @@ es_result es_bvh_build(es_bvh* bvh, const es_draw_list* list)
     if (vertices > 0x7fffffffu || triangles > 0x7ffffffeu)
         return es_fail(context, ES_INVALID_ARGUMENT, "ray tracing takes up to 2^31 - 2 triangles and vertices; the scene has %llu and %llu", (unsigned long long)triangles, (unsigned long long)vertices);
     bvh->instance_count = list->instance_count;
-    bvh->first_vertex = es_allocate_array(context, list->instance_count, sizeof *bvh->first_vertex);
-    bvh->first_primitive = es_allocate_array(context, (size_t)list->instance_count + 1, sizeof *bvh->first_primitive);
-    bvh->signature = es_allocate_array(context, list->instance_count, sizeof *bvh->signature);
-    bvh->shape = es_allocate_array(context, (size_t)list->instance_count * 2, sizeof *bvh->shape);
     bvh->vertex_count = (uint32_t)vertices;
     bvh->primitive_count = (uint32_t)triangles;
-    bvh->vertices = es_allocate_array(context, vertices, sizeof *bvh->vertices);
-    bvh->corners = es_allocate_array(context, triangles * 3, sizeof *bvh->corners);
-    bvh->primitives = es_allocate_array(context, triangles, sizeof *bvh->primitives);
-    es_result result = ES_OK;
-    if (!bvh->first_vertex || !bvh->first_primitive || !bvh->signature || !bvh->shape || !bvh->vertices || !bvh->corners || !bvh->primitives) result = es_context_last_result(context);
+    bool all = (bvh->first_vertex = es_allocate_array(context, list->instance_count, sizeof *bvh->first_vertex)) &&
+        (bvh->first_primitive = es_allocate_array(context, (size_t)list->instance_count + 1, sizeof *bvh->first_primitive)) &&
+        (bvh->signature = es_allocate_array(context, list->instance_count, sizeof *bvh->signature)) &&
+        (bvh->shape = es_allocate_array(context, (size_t)list->instance_count * 2, sizeof *bvh->shape)) &&
+        (bvh->vertices = es_allocate_array(context, vertices, sizeof *bvh->vertices)) &&
+        (bvh->corners = es_allocate_array(context, triangles * 3, sizeof *bvh->corners)) &&
+        (bvh->primitives = es_allocate_array(context, triangles, sizeof *bvh->primitives));
+    es_result result = all ? ES_OK : es_context_last_result(context);
     if (!result) {
         uint32_t vertex = 0, primitive = 0;
         for (uint32_t i = 0; i < list->instance_count; i++) {

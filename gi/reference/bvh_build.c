@@ -326,12 +326,11 @@ es_result es_bvh_build_nodes(es_bvh* bvh)
     const uint32_t limit = n / 32 > 4096 ? n / 32 : 4096;
     const uint32_t task_places = 2 * (n / (limit / 2 ? limit / 2 : 1)) + 256;
     builder b = {.bvh = bvh};
-    b.items = es_allocate_array(context, n, sizeof *b.items);
-    b.tree = es_allocate_array(context, node_places, sizeof *b.tree);
     size_t task_capacity = task_places;
-    b.tasks = es_allocate_array(context, task_capacity, sizeof *b.tasks);
-    bins* scratch = es_allocate_array(context, CHUNKS + 1, sizeof *scratch);
-    es_result result = b.items && b.tree && b.tasks && scratch ? ES_OK : es_context_last_result(context);
+    bins* scratch = NULL;
+    bool all = (b.items = es_allocate_array(context, n, sizeof *b.items)) && (b.tree = es_allocate_array(context, node_places, sizeof *b.tree)) &&
+        (b.tasks = es_allocate_array(context, task_capacity, sizeof *b.tasks)) && (scratch = es_allocate_array(context, CHUNKS + 1, sizeof *scratch));
+    es_result result = all ? ES_OK : es_context_last_result(context);
     if (!result) {
         item_job items = {bvh, b.items};
         es_parallel_for(context, n, 4096, make_items, &items);
@@ -352,12 +351,12 @@ es_result es_bvh_build_nodes(es_bvh* bvh)
     }
     if (!result) {
         wide_counts total = count_wide(b.tree, 0);
-        bvh->nodes = es_allocate_array(context, total.nodes, sizeof *bvh->nodes);
-        bvh->blocks = es_allocate_array(context, total.blocks, sizeof *bvh->blocks);
-        bvh->boxes = es_allocate_array(context, total.blocks, sizeof *bvh->boxes);
         bvh->node_count = total.nodes;
         bvh->block_count = total.blocks;
-        if (bvh->nodes && bvh->blocks && bvh->boxes) {
+        all = (bvh->nodes = es_allocate_array(context, total.nodes, sizeof *bvh->nodes)) &&
+            (bvh->blocks = es_allocate_array(context, total.blocks, sizeof *bvh->blocks)) &&
+            (bvh->boxes = es_allocate_array(context, total.blocks, sizeof *bvh->boxes));
+        if (all) {
             wide_counts used = {0, 0};
             emit(bvh, &b, 0, &used);
         } else {

@@ -48,14 +48,14 @@ static void spot_pose(float phase, es_vec3* translation, es_quat* rotation)
 
 static void add_wall(es_scene_builder* builder, const char* name, es_vec3 low, es_vec3 high, es_material material)
 {
-    es_shape shape = es_shape_begin(es_world_context(builder->world));
+    es_shape shape = es_build_shape(builder);
     es_shape_box(&shape, low, high);
     es_build_object(builder, name, &shape, material, es_v3(0, 0, 0));
 }
 
 static es_node add_cube(es_scene_builder* builder, const char* name, es_vec3 half, es_material material)
 {
-    es_shape shape = es_shape_begin(es_world_context(builder->world));
+    es_shape shape = es_build_shape(builder);
     es_shape_box(&shape, es_v3_scale(half, -1), half);
     return es_build_object(builder, name, &shape, material, es_v3(0, 0, 0));
 }
@@ -101,7 +101,7 @@ es_result es_scene_cornell(es_world* world, uint32_t triangles)
         along = (uint32_t)(quads / (float)around);
         if (along < 9) along = 9;
     }
-    es_shape knot = es_shape_begin(es_world_context(world));
+    es_shape knot = es_build_shape(&builder);
     es_shape_torus_knot(&knot, es_v3(0, 0, 0), 2, 3, 0.37f, 0.085f, along, around);
     es_motion motions[] = {
         {es_build_object(&builder, "knot", &knot, bronze, es_v3(0, 0, 0)), knot_pose},

@@ -30,7 +30,7 @@ static uint32_t steps(const detail* d, float count, uint32_t least)
     return n < least ? least : n;
 }
 
-static es_shape begin(const es_scene_builder* builder) { return es_shape_begin(es_world_context(builder->world)); }
+static es_shape begin(es_scene_builder* builder) { return es_build_shape(builder); }
 static float bay_line(int k) { return -half_length + bay * (float)k; }
 
 /* ---- columns ---------------------------------------------------------------------------------------------------------------- */

@@ -33,7 +33,7 @@ static void add_walls(es_scene_builder* builder, uint32_t n)
         {"right wall", {x, -y, -z}, along_z, along_y, {-1, 0, 0}, {0.1f, 0.75f, 0.1f}},
     };
     for (int i = 0; i < 6; i++) {
-        es_shape shape = es_shape_begin(es_world_context(builder->world));
+        es_shape shape = es_build_shape(builder);
         es_shape_plane(&shape, walls[i].origin, walls[i].du, walls[i].dv, walls[i].normal, n, n);
         es_material material = es_build_lambert(builder, walls[i].name, walls[i].color[0], walls[i].color[1], walls[i].color[2]);
         es_build_object(builder, walls[i].name, &shape, material, es_v3(0, 0, 0));
@@ -72,7 +72,7 @@ es_result es_scene_room(es_world* world, uint32_t triangles)
         for (int c = 0; c < 3; c++) color[c] = 0.25f + 0.6f * next_unit(&state);
         bool torus = k % 3 == 2;
         const char* name = torus ? "torus" : "sphere";
-        es_shape shape = es_shape_begin(es_world_context(world));
+        es_shape shape = es_build_shape(&builder);
         shape.keep_degenerate = true; /* the triangles at the poles count */
         if (torus) es_shape_torus(&shape, es_v3(0, 0, 0), 0.26f, 0.09f, 1.2f * next_unit(&state) + 0.4f, nu, nv);
         else es_shape_sphere(&shape, es_v3(0, 0, 0), 0.22f + 0.08f * next_unit(&state), nu, nv);

@@ -22,6 +22,13 @@ es_material es_build_lambert(es_scene_builder* builder, const char* name, float 
     return es_build_material(builder, name, &desc);
 }
 
+es_shape es_build_shape(es_scene_builder* builder)
+{
+    es_shape shape = es_shape_begin(es_world_context(builder->world));
+    shape.stop = &builder->result;
+    return shape;
+}
+
 es_mesh es_build_mesh(es_scene_builder* builder, const char* name, es_shape* shape)
 {
     es_mesh mesh = {0};
