@@ -9,6 +9,10 @@ if(NOT EARTHSHINE_TESTS)
   return()
 endif()
 enable_testing()
+if(EARTHSHINE_FUZZ)
+  include(${CMAKE_SOURCE_DIR}/tests/fuzz/fuzz.cmake)
+  return()
+endif()
 
 # Prints the hash of every image of a few small frames; the determinism matrix and the goldens compare its output. It
 # needs no test library, so that it can be built for a machine that has none.
@@ -81,6 +85,10 @@ endforeach()
 # Every pass of a frame on three threads: what a sanitizer has to see.
 add_test(NAME frame COMMAND frame_hashes --threads 3 WORKING_DIRECTORY ${CMAKE_BINARY_DIR})
 set_tests_properties(frame PROPERTIES LABELS "unit;threaded" TIMEOUT ${test_seconds} ENVIRONMENT "${test_environment}")
+
+if(NOT CMAKE_CROSSCOMPILING)
+  include(${CMAKE_SOURCE_DIR}/tests/fuzz/fuzz.cmake)
+endif()
 
 # The scripts look at objects, installed files and figures, which a sanitizer changes.
 if(NOT EARTHSHINE_SANITIZE)
