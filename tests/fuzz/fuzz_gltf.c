@@ -8,7 +8,7 @@
 
 #include "tests/fuzz/fuzz.h"
 
-enum { CAP = 48 << 20 };
+enum { CAP = 32 << 20 };
 
 /* Linked in the place of fopen for the library's calls (--wrap): whatever the input says, only these are opened while it is read. */
 static bool importing;

@@ -276,6 +276,10 @@ static int copy_asset(const char* path, const struct stat* status, int kind, str
     size_t size;
     uint8_t* bytes = target ? fuzz_read(path, &size) : NULL;
     if (!bytes) return 0;
+    if (size > 24 && !memcmp(bytes + 12, "IHDR", 4) && (bytes[16] | bytes[17] | bytes[18] | bytes[20] | bytes[21] | bytes[22])) {
+        free(bytes); /* 256 pixels or more in a row or column: every try would take long */
+        return 0;
+    }
     char name[256];
     static unsigned number;
     snprintf(name, sizeof name, "asset-%u-%.200s", number++, path + where->base);
