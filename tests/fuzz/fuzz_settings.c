@@ -39,7 +39,7 @@ static void try_pattern(const demo_options* options)
 {
     char path[DEMO_PATH_SIZE];
     listen();
-    int code = demo_check_pattern(options->out, options->end - options->first);
+    int code = demo_check_pattern("--out", options->out, options->end - options->first);
     hear(code);
     if (code != DEMO_OK) return;
     const uint32_t frames[] = {options->first, options->end - 1, DEMO_MAX_FRAMES};
