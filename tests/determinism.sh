@@ -12,26 +12,43 @@ build=$1
 source=$2
 matrix=${3:-}
 work=$build/determinism
-mkdir -p "$work"
+results=$work/results
+rm -rf "$results"
+mkdir -p "$results"
 compared=0
 different=0
 reference=$work/reference.txt
 skipped_one=
 
-# compare NAME COMMAND…: the command's lines against the reference's
+# compare NAME COMMAND…: the command's lines against the reference's. As many run side by side as there are processors; what each found
+# lies in results/NUMBER, empty when nothing differs, and collect prints it in their order.
 compare()
 {
-    local name=$1
+    local name=$1 number=$compared
     shift
     compared=$((compared + 1))
-    if ! "$@" >"$work/lines.txt" 2>"$work/errors.txt"; then
+    while [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; do wait -n; done
+    {
+        local lines=$results/$number.lines
+        if ! "$@" >"$lines" 2>"$results/$number.errors"; then
+            echo "FAILED: $name: $(tail -n 1 "$results/$number.errors")"
+        elif ! grep -E "^(${scenes// /|}) " "$reference" | cmp -s - "$lines"; then
+            echo "FAILED: $name differs in (scene frame image):"
+            grep -E "^(${scenes// /|}) " "$reference" | diff - "$lines" | sed -n 's/^> \(.*\) [0-9a-f]*$/    \1/p' | head -n 12
+        fi
+    } >"$results/$number.running" && mv "$results/$number.running" "$results/$number" &
+}
+
+collect()
+{
+    wait
+    local number
+    for ((number = 0; number < compared; number++)); do
+        [ -f "$results/$number" ] || echo "FAILED: comparison $number did not end" >"$results/$number"
+        [ -s "$results/$number" ] || continue
         different=$((different + 1))
-        echo "FAILED: $name: $(tail -n 1 "$work/errors.txt")"
-    elif ! grep -E "^(${scenes// /|}) " "$reference" | cmp -s - "$work/lines.txt"; then
-        different=$((different + 1))
-        echo "FAILED: $name differs in (scene frame image):"
-        grep -E "^(${scenes// /|}) " "$reference" | diff - "$work/lines.txt" | sed -n 's/^> \(.*\) [0-9a-f]*$/    \1/p' | head -n 12
-    fi
+        cat "$results/$number"
+    done
 }
 
 # every_way NAME PROGRAM THREADS…: all instruction sets with each of the numbers of threads, then without skipping
@@ -57,9 +74,8 @@ configure_and_build()
     if ! cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DEARTHSHINE_TESTS=ON -DEARTHSHINE_DEMOS=OFF \
         -DEARTHSHINE_WITH_OPENEXR=OFF -DEARTHSHINE_WITH_PNG=OFF -DEARTHSHINE_WITH_GLFW=OFF -DEARTHSHINE_WITH_TINYGLTF=OFF \
         "$@" >"$folder.log" 2>&1 || ! cmake --build "$folder" --target frame_hashes >>"$folder.log" 2>&1; then
+        echo "FAILED: the build in $folder: $(grep -m 1 -E 'error:|undefined reference|CMake Error' "$folder.log" || tail -n 1 "$folder.log")" >"$results/$compared"
         compared=$((compared + 1))
-        different=$((different + 1))
-        echo "FAILED: the build in $folder: $(grep -m 1 -E 'error:|undefined reference|CMake Error' "$folder.log" || tail -n 1 "$folder.log")"
         return 1
     fi
 }
@@ -103,6 +119,7 @@ else
     fi
 fi
 
+collect
 [ -n "$skipped_one" ] && echo "some of the matrix was skipped"
 echo "$compared compared, $different different"
 [ $different -eq 0 ]
