@@ -1,4 +1,5 @@
-/* Where virtual point lights go: hierarchical warping against its probabilities, and the Halton points that drive it. */
+/* Where virtual point lights go: hierarchical warping against its probabilities, and the Halton points that drive it; and where the points
+ * of imperfect shadow maps lie: evenly over the world's area. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,8 +10,10 @@
 
 #include <cmocka.h>
 
+#include "gi/scene_points.h"
 #include "gi/vpl_sampling.h"
 #include "platform/random.h"
+#include "tests/small_worlds.h"
 #include "tests/statistics.h"
 
 enum { SIZE = 16, LEVELS = 5, FACES = 6, TEXELS = SIZE * SIZE };
@@ -94,11 +97,94 @@ static void test_halton_boxes(void** state)
         }
 }
 
+/* ---- points of the scene -------------------------------------------------------------------------------------------------------------- */
+
+static double area_of(const es_raster_instance* instance, uint32_t triangle, double corner[3][3])
+{
+    for (int c = 0; c < 3; c++) {
+        const float* p = instance->mesh->positions + 4 * (size_t)instance->mesh->indices[3 * triangle + (uint32_t)c];
+        const float* m = instance->transform.m;
+        for (int k = 0; k < 3; k++) corner[c][k] = (double)m[k] * (double)p[0] + (double)m[4 + k] * (double)p[1] + (double)m[8 + k] * (double)p[2] + (double)m[12 + k];
+    }
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = corner[1][k] - corner[0][k];
+        v[k] = corner[2][k] - corner[0][k];
+    }
+    return 0.5 * sqrt(pow(u[1] * v[2] - u[2] * v[1], 2) + pow(u[2] * v[0] - u[0] * v[2], 2) + pow(u[0] * v[1] - u[1] * v[0], 2));
+}
+
+/* Triangles of many sizes, an instance that is stretched, one that is mirrored. Every subset's points are one in each of as many equal shares
+ * of the whole area, in the order of the triangles: a triangle's number differs from its share by less than two. Within triangles they are
+ * random: chi-square over sixteen equal parts. */
+static void test_scene_points(void** state)
+{
+    enum { POINTS = 256, SUBSETS = 128, PARTS = 4, MOST = 400 };
+    small_world w = small_world_create();
+    es_material_desc grey = lambert(0.5f, 0);
+    add_rectangle(&w, es_v3(-2, 0, 2), es_v3(4, 0, 0), es_v3(0, 0, -4), &grey);
+    add_sphere(&w, es_v3(0, 1, 0), 0.8f, 6, false, &grey);
+    uint32_t ids[8];
+    size_t count = 8;
+    assert_int_equal(es_world_enumerate(w.world, ES_OBJECT_INSTANCE, ids, &count), ES_OK);
+    es_instance_desc ball;
+    assert_int_equal(es_world_get_instance(w.world, (es_instance){ids[1]}, &ball), ES_OK);
+    for (int i = 0; i < 2; i++) {
+        es_instance added;
+        es_node_desc node = {.transform = {es_v3((float)i, 2, 0), es_quat_from_axis_angle(es_v3(1, 0, 0), 0.7f), i ? es_v3(-0.5f, 0.5f, 0.5f) : es_v3(3, 0.5f, 1)}};
+        assert_int_equal(es_world_add_node(w.world, &node, &ball.node), ES_OK);
+        assert_int_equal(es_world_add_instance(w.world, &ball, &added), ES_OK);
+    }
+    assert_int_equal(es_world_step(w.world, 0), ES_OK);
+    const es_draw_list* list = es_world_draw_list(w.world);
+    es_scene_points points = {0};
+    uint64_t moved;
+    assert_int_equal(es_scene_points_update(w.context, &points, list, POINTS, SUBSETS, &moved), ES_OK);
+    assert_int_equal(moved, POINTS * SUBSETS);
+
+    double total = 0, corner[3][3];
+    static double cells[MOST][2], parts[2 * PARTS * PARTS][2];
+    static uint32_t counts[SUBSETS][MOST], instance_of[POINTS * SUBSETS];
+    uint32_t triangles = 0, first[8] = {0};
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        first[i] = triangles;
+        for (uint32_t t = 0; t < list->instances[i].mesh->triangle_count; t++) total += cells[triangles++][0] = area_of(&list->instances[i], t, corner);
+    }
+    assert_true(triangles < MOST && fabs((double)points.area / total - 1) < 1e-5);
+    for (size_t r = 0; r < points.run_count; r++)
+        for (uint32_t i = 0; i < points.runs[r].count; i++) instance_of[points.runs[r].first + i] = points.runs[r].instance;
+    for (uint32_t i = 0; i < POINTS * SUBSETS; i++) {
+        const es_raster_instance* instance = &list->instances[instance_of[i]];
+        double u = (points.barycentric[i] & 0xffff) / 65535.0, v = (points.barycentric[i] >> 16) / 65535.0;
+        area_of(instance, points.triangle[i], corner);
+        const double place[3] = {(double)points.x[i], (double)points.y[i], (double)points.z[i]};
+        for (int k = 0; k < 3; k++) assert_true(fabs(place[k] - ((1 - u - v) * corner[0][k] + u * corner[1][k] + v * corner[2][k])) < 1e-5);
+        counts[i / POINTS][first[instance_of[i]] + points.triangle[i]]++;
+        cells[first[instance_of[i]] + points.triangle[i]][1]++;
+        int a = (int)fmin(u * PARTS, PARTS - 1), b = (int)fmin(v * PARTS, PARTS - 1), part = 2 * (a * PARTS + b) + (u * PARTS - a + v * PARTS - b > 1);
+        parts[part][1]++;
+    }
+    for (uint32_t s = 0; s < SUBSETS; s++)
+        for (uint32_t t = 0; t < triangles; t++)
+            if (!(fabs(counts[s][t] - POINTS * cells[t][0] / total) < 2)) fail_msg("subset %u: %u points on triangle %u, its share are %.2f", s, counts[s][t], t, POINTS * cells[t][0] / total);
+    for (uint32_t t = 0; t < triangles; t++) cells[t][0] *= POINTS * SUBSETS / total;
+    for (int a = 0; a < PARTS; a++)
+        for (int b = 0; b < PARTS; b++)
+            for (int upper = 0; upper < 2; upper++) parts[2 * (a * PARTS + b) + upper][0] = a + b + upper < PARTS ? POINTS * SUBSETS / (double)(PARTS * PARTS) : 0;
+    double on_triangles = chi_square_deviate(cells, (int)triangles, NULL), within = chi_square_deviate(parts, 2 * PARTS * PARTS, NULL);
+    /* stratified points scatter much less than random ones; 1 % two-sided for those that are random */
+    if (!(on_triangles < -3)) fail_msg("numbers per triangle: chi-square %.2f deviations", on_triangles);
+    if (!(fabs(within) < 2.6)) fail_msg("places in triangles: chi-square %.2f deviations", within);
+    es_scene_points_free(w.context, &points);
+    small_world_destroy(&w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_warp),
         cmocka_unit_test(test_halton_boxes),
+        cmocka_unit_test(test_scene_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@
 #include "gi/surface.h"
 #include "platform/random.h"
 #include "tests/statistics.h"
+#include "tests/surface_in_double.h"
 
 static uint32_t counter;
 static float uniform(float low, float high) { return low + (high - low) * es_random_float(77, counter++); }
@@ -59,6 +60,33 @@ static const surface_case cases[] = {
 enum { CASES = sizeof cases / sizeof cases[0] };
 
 static es_surface surface_of(const surface_case* c) { return es_surface_of(c->model, es_v3(c->base, 0.7f * c->base, c->base), c->metallic, c->roughness, c->specular); }
+
+/* ---- the formulas ------------------------------------------------------------------------------------------------------------------ */
+
+/* Every model, written once more in double precision from its documentation, over random surfaces and directions. Rounding of NH² (1 - alpha²)
+ * against 1 comes into the lobe twice: (6 ulp / what is left)². */
+static void test_formulas(void** state)
+{
+    (void)state;
+    for (int trial = 0; trial < 60000; trial++) {
+        exact_surface e = {.model = trial % 8 == 0 ? ES_SURFACE_UNLIT : trial % 3 ? ES_SURFACE_METALLIC_ROUGHNESS : ES_SURFACE_PHONG};
+        float base = uniform(0, 1), metallic = trial % 4 ? uniform(0, 1) : (float)(trial / 4 % 2), specular = trial % 5 ? uniform(0, 1) : 0;
+        float roughness = e.model == ES_SURFACE_PHONG ? uniform(1, 50) : uniform(0.02f, 1);
+        e.base = (double)base;
+        e.metallic = (double)metallic;
+        e.roughness = (double)roughness;
+        e.specular = (double)specular;
+        es_surface s = es_surface_of(e.model, es_v3(base, base, base), metallic, roughness, specular);
+        es_vec3 n = es_v3(0, 0, 1), wo = direction_at(n, uniform(0.01f, 1)), wi = direction_at(n, uniform(0.01f, 1));
+        /* half of them near the mirror direction, where the lobe is */
+        if (trial & 1) wi = es_v3_normalize(es_v3_add(es_v3(-wo.x, -wo.y, wo.z), es_v3_scale(random_direction(), uniform(0, 0.2f))), n);
+        const double i[3] = {(double)wi.x, (double)wi.y, (double)wi.z}, o[3] = {(double)wo.x, (double)wo.y, (double)wo.z};
+        double expected = exact_brdf(&e, i, o), found = (double)es_surface_evaluate(&s, n, wi, wo).x;
+        double h[3] = {i[0] + o[0], i[1] + o[1], i[2] + o[2]}, nh2 = h[2] * h[2] / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+        double a2 = fmax(pow(e.roughness, 4), 6.25e-6), rounding = e.model == ES_SURFACE_METALLIC_ROUGHNESS ? 2 * 3.6e-7 / (1 - nh2 * (1 - a2)) : 1e-5;
+        if (!(fabs(found - expected) <= (2e-5 + rounding) * expected)) fail_msg("trial %d, model %d: %.8g, expected %.8g (roughness %g)", trial, (int)e.model, found, expected, e.roughness);
+    }
+}
 
 /* ---- densities ------------------------------------------------------------------------------------------------------------------ */
 
@@ -247,6 +275,7 @@ static void test_reciprocity_over_random_directions(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_formulas),
         cmocka_unit_test(test_sampler_follows_density),
         cmocka_unit_test(test_weights),
         cmocka_unit_test(test_nothing_to_sample),
