@@ -18,7 +18,8 @@
  * Triangles with textures or moving vertices ("complex") are interpolated per pixel from their vertices instead.
  *
  * Visibility is decided on snapped vertices, so a pixel centre can lie outside the unsnapped triangle; where lambda is computed, negative
- * ones become zero, and 1 / w is kept within the vertices' range, so that slivers stay harmless.
+ * ones become zero, and 1 / w is kept within the vertices' range. Of a sliver not much wider than that distance, the negative part is as
+ * large as the rest, and without it the others would say a place far along the triangle: there the nearest point of the triangle is taken.
  */
 #include "raster/kernel_table.h"
 #include "raster/kernels/texture_sampling.h"
@@ -222,6 +223,32 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
 }
 
 /* Edge functions at the pixel (x, y) and what follows from them. */
+/* Barycentric coordinates, perspective-correct, of the point of the triangle's border nearest to the pixel; x, y: window coordinates
+ * times w relative to the pixel, w > 0. */
+VINL void nearest_on_border(const vf x[3], const vf y[3], const vf w[3], vf lambda[3])
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f);
+    vf px[3], py[3], best = vf_set1(3e38f);
+    for (int k = 0; k < 3; k++) {
+        vf inverse = one / w[k];
+        px[k] = x[k] * inverse;
+        py[k] = y[k] * inverse;
+    }
+    for (int k = 0; k < 3; k++) {
+        int i = k < 2 ? k + 1 : 0, j = i < 2 ? i + 1 : 0; /* the edge across from k */
+        vf ex = px[j] - px[i], ey = py[j] - py[i], length2 = ex * ex + ey * ey;
+        vf t = vf_clamp(vf_neg(px[i] * ex + py[i] * ey) / vf_select(vm_gt(length2, zero), length2, one), zero, one);
+        vf qx = px[i] + t * ex, qy = py[i] + t * ey, d2 = qx * qx + qy * qy;
+        vm nearer = vm_lt(d2, best);
+        /* 1 - t and t, each over its vertex's w */
+        vf a = (one - t) * w[j], b = t * w[i], inverse = one / (a + b);
+        best = vf_select(nearer, d2, best);
+        lambda[k] = vf_select(nearer, zero, lambda[k]);
+        lambda[i] = vf_select(nearer, a * inverse, lambda[i]);
+        lambda[j] = vf_select(nearer, b * inverse, lambda[j]);
+    }
+}
+
 VINL void start_surface(const es_resolve_job* job, const es_prepared_instance* instance, vm active, vi id, vf x, vf y, bool gradients, surface8* s)
 {
     s->instance = instance;
@@ -253,6 +280,21 @@ VINL void start_surface(const es_resolve_job* job, const es_prepared_instance* i
     s->lambda[0] = vf_select(solid, c0 * inverse, one);
     s->lambda[1] = c1 * inverse;
     s->lambda[2] = c2 * inverse;
+    vm sliver = active & vm_gt(total, vf_abs(sum) * vf_set1(1.0f + 0x1p-10f)) & vm_gt(vf_min(s->w[0], vf_min(s->w[1], s->w[2])), zero);
+    if (vm_any(sliver)) {
+        vf wide[3], xs[3], ys[3], nearest[3] = {one, zero, zero};
+        for (int k = 0; k < 3; k++) {
+            wide[k] = vf_select(sliver, s->w[k], one);
+            xs[k] = vf_and(sliver, xr[k]);
+            ys[k] = vf_and(sliver, yr[k]);
+        }
+        nearest_on_border(xs, ys, wide, nearest);
+        for (int k = 0; k < 3; k++) s->lambda[k] = vf_select(sliver, nearest[k], s->lambda[k]);
+        /* S at that point is D / w, not what is left of it at the pixel */
+        vf d = vf_abs(b[0] * s->w[0] + b[1] * s->w[1] + b[2] * s->w[2]), w = s->lambda[0] * s->w[0] + s->lambda[1] * s->w[1] + s->lambda[2] * s->w[2];
+        vm flat = sliver & vm_gt(d, w * vf_set1(1e-20f));
+        inverse = vf_select(flat, vf_select(flat, w, one) / vf_select(flat, d, one), inverse);
+    }
     s->inverse = vf_from_bits(vi_from_bits(inverse) | sign);
     /* window y is down: counter-clockwise triangles have negative S */
     if (instance->cull_positive == instance->cull_negative)
