@@ -38,7 +38,7 @@ typedef struct es_renderer_settings {
     /* direct light */
     uint32_t shadow_size;            /* texels of a shadow map's side */
     float shadow_bias;               /* constant part, texels */
-    float shadow_slope_bias;         /* slope-scaled part, texels */
+    float shadow_slope_bias;         /* slope-scaled part, shares of the filter's half width */
     uint32_t shadow_filter;          /* percentage-closer filter: taps per side, 1 … 7 */
     /* virtual point lights */
     uint32_t vpls;                   /* per frame, over all lights */

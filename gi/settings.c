@@ -13,7 +13,7 @@ static const es_setting renderer_table[] = {
 
     {"shadow.size", ES_SETTING_INT, "1024", 16, 8192, NULL, "texels of a shadow map's side", AT(shadow_size)},
     {"shadow.bias", ES_SETTING_FLOAT, "0.5", 0, 64, NULL, "constant depth bias, texels", AT(shadow_bias)},
-    {"shadow.slope-bias", ES_SETTING_FLOAT, "1.0", 0, 64, NULL, "slope-scaled depth bias, texels", AT(shadow_slope_bias)},
+    {"shadow.slope-bias", ES_SETTING_FLOAT, "1.0", 0, 64, NULL, "slope-scaled depth bias, shares of the filter's half width", AT(shadow_slope_bias)},
     {"shadow.filter", ES_SETTING_INT, "2", 1, 7, NULL, "percentage-closer filter, taps per side", AT(shadow_filter)},
 
     {"vpl.count", ES_SETTING_INT, "1024", 0, 16384, NULL, "virtual point lights per frame", AT(vpls)},

@@ -3,7 +3,7 @@
  *
  * A shadow-map texel of width s stores one depth; on a surface tilted by the angle a the depth inside a texel varies by s tan a,
  * and a filter k taps wide reaches k/2 texels out. So the receiver is moved towards the light by
- * (constant + slope tan a) · s, in metres along the view axis, before the comparison.
+ * (constant + slope k/2 tan a) · s, in metres along the view axis, before the comparison.
  */
 #include "gi/kernel_table.h"
 #include "gi/kernels/surface_simd.h"
@@ -24,7 +24,7 @@ static vf lit_share(const es_direct_job* job, const es_light_face* face, vm lane
     const uint32_t size = face->shadow_view.width;
     vf one = vf_set1(1.0f), half_size = vf_set1(0.5f * (float)size);
     vf cx = row_times(m, 0, px, py, pz), cy = row_times(m, 1, px, py, pz), cz = row_times(m, 2, px, py, pz), cw = row_times(m, 3, px, py, pz);
-    vf texels = vf_set1(job->shadow_bias) + vf_set1(job->shadow_slope_bias) * slope;
+    vf texels = vf_set1(job->shadow_bias) + vf_set1(job->shadow_slope_bias * 0.5f * (float)job->shadow_filter) * slope;
     vf reference;
     if (view->orthographic) {
         /* depth falls by -m_z per metre along the axis */
