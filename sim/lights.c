@@ -26,7 +26,8 @@ static es_result resolve(es_world* world, const es_light_desc* desc, es_light_de
     if (d.node.id && !es_world_object(world, ES_OBJECT_NODE, d.node.id)) return ES_STALE_HANDLE;
     const char* wrong = (uint32_t)d.type > ES_LIGHT_DIRECTIONAL ? "its type must be one of es_light_type"
                         : !es_within(d.color[0], 0, 1e6f) || !es_within(d.color[1], 0, 1e6f) || !es_within(d.color[2], 0, 1e6f) ? "its colour must lie in 0 … 1e6"
-                        : !es_within(d.intensity, 0, 1e12f) ? "its intensity must lie in 0 … 1e12"
+                        : !es_within(d.intensity, 0, 1e20f) ? "its intensity must lie in 0 … 1e20"
+                        : !es_within(d.intensity * es_maxf(d.color[0], es_maxf(d.color[1], d.color[2])), 0, 1e20f) ? "its colour times its intensity must lie in 0 … 1e20"
                         : !es_within(d.range, 0, 1e12f)     ? "its range must lie in 0 … 1e12 metres"
                         : d.type == ES_LIGHT_SPOT && (!es_within(d.outer_cone, 1e-4f, 0.5f * ES_PI) || !es_within(d.inner_cone, 0, d.outer_cone))
                             ? "its cone must satisfy 0 <= inner <= outer <= pi / 2"

@@ -148,7 +148,7 @@ typedef struct es_light_desc {
     es_node node;
     es_light_type type;
     float color[3];           /* linear, times intensity */
-    float intensity;          /* W/sr for spot and point, W/m² for directional */
+    float intensity;          /* W/sr for spot and point, W/m² for directional; up to 1e20, also when multiplied with the colour */
     float inner_cone, outer_cone; /* spot: half angles, radians; glTF's falloff between them */
     float range;              /* metres; 0: unlimited (glTF's window otherwise) */
     bool off;

@@ -90,6 +90,29 @@ void es_reference_forget(es_reference* r)
     r->resumed_samples = 0;
 }
 
+static float largest_of(const float c[3]) { return es_maxf(c[0], es_maxf(c[1], c[2])); }
+
+/* Squares of light that is very strong or weak would leave the range of floats: they are kept in a unit of the strongest source's own, a power
+ * of two, and of 1 within 1e9 of it. */
+static float unit_of(const es_trace_scene* scene)
+{
+    es_vec3 low, high;
+    es_bvh_bounds(scene->bvh, &low, &high);
+    float extent = es_maxf(es_v3_length(es_v3_sub(high, low)), 1e-9f), strongest = 0.0f;
+    for (uint32_t i = 0; i < scene->light_count; i++) {
+        const es_light_state* light = &scene->lights[i];
+        float radiant = largest_of(light->radiant);
+        if (light->type != ES_LIGHT_DIRECTIONAL) radiant = es_minf(radiant / extent, 1e28f * extent) / extent;
+        strongest = es_maxf(strongest, radiant);
+    }
+    for (uint32_t i = 0; i < scene->material_count; i++) strongest = es_maxf(strongest, largest_of(scene->materials[i].emission));
+    if (scene->has_environment) strongest = es_maxf(strongest, largest_of(scene->environment.radiance));
+    if (!(strongest > 1e9f || (strongest > 1e-30f && strongest < 1e-9f))) return 1.0f;
+    union { float f; uint32_t u; } unit = {strongest};
+    unit.u &= 0x7f800000u;
+    return unit.f;
+}
+
 static es_result begin(es_reference* r, es_world* world)
 {
     es_camera camera = es_world_active_camera(world);
@@ -114,6 +137,7 @@ static es_result begin(es_reference* r, es_world* world)
     r->stats.build_seconds = built;
     es_reference_forget(r);
     r->fingerprint = es_reference_fingerprint(r);
+    r->unit = unit_of(&r->scene);
     r->begun = true;
     return ES_OK;
 }
@@ -147,6 +171,7 @@ static void sample_rows(void* user, uint32_t begin_row, uint32_t end_row, uint32
     sample_job* job = user;
     es_reference* r = job->r;
     const size_t plane = value_count(r);
+    const float per_unit = 1.0f / r->unit;
     es_vec3 bounce[MAX_BOUNCES + 1];
     for (uint32_t y = begin_row; y < end_row; y++) {
         uint64_t rays = 0;
@@ -170,15 +195,15 @@ static void sample_rows(void* user, uint32_t begin_row, uint32_t end_row, uint32
                     for (int k = 0; k < 3; k++) {
                         size_t at = (size_t)pixel * 3 + k;
                         add(&r->sums[(b + 1) * plane + at], value[k]);
-                        r->squares[b * plane + at] += value[k] * value[k];
+                        r->squares[b * plane + at] += (value[k] * per_unit) * (value[k] * per_unit);
                         total[k] += value[k];
                         if (b) indirect[k] += value[k];
                     }
                 }
                 for (int k = 0; k < 3; k++) {
                     size_t at = (size_t)pixel * 3 + k;
-                    r->squares[(r->bounces + 1) * plane + at] += indirect[k] * indirect[k];
-                    r->squares[(r->bounces + 2) * plane + at] += total[k] * total[k];
+                    r->squares[(r->bounces + 1) * plane + at] += (indirect[k] * per_unit) * (indirect[k] * per_unit);
+                    r->squares[(r->bounces + 2) * plane + at] += (total[k] * per_unit) * (total[k] * per_unit);
                 }
             }
         }
@@ -193,12 +218,12 @@ float es_reference_mean(const es_reference* r, uint32_t image, size_t at)
 }
 
 /* Variance of the mean from that of single samples. Stratified samples do better than independent ones, so this errs on the safe side. */
-float es_reference_variance(const es_reference* r, uint32_t square, size_t at, float mean)
+double es_reference_variance(const es_reference* r, uint32_t square, size_t at, float mean)
 {
-    double n = (double)r->stats.samples;
-    if (n < 2) return __builtin_inff();
-    double v = ((double)r->squares[square * value_count(r) + at] / n - (double)mean * mean) / (n - 1);
-    return v > 0.0 ? (float)v : 0.0f;
+    double n = (double)r->stats.samples, unit = r->unit;
+    if (n < 2) return __builtin_inf();
+    double v = ((double)r->squares[square * value_count(r) + at] * (unit * unit) / n - (double)mean * mean) / (n - 1);
+    return v > 0.0 ? v : 0.0;
 }
 
 static float radiance_mean(const es_reference* r, size_t at, uint32_t first_image)

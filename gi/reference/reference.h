@@ -19,7 +19,8 @@ struct es_reference {
     es_pixel_rays rays;
     uint32_t width, height, bounces;   /* of the film */
     es_film_sum* sums;                 /* [image][pixel][3] */
-    float* squares;                    /* [image][pixel][3] */
+    float* squares;                    /* [image][pixel][3], of values over `unit` */
+    float unit;                        /* of radiance, a power of two */
     uint64_t* row_rays;                /* per row of pixels, of the last call */
     uint64_t fingerprint;
     es_reference_stats stats;
@@ -32,7 +33,7 @@ uint32_t es_reference_square_count(const es_reference* reference);
 /* Mean of an image at a value (pixel × 3 + channel). */
 float es_reference_mean(const es_reference* reference, uint32_t image, size_t at);
 /* Variance of that mean; infinite before the second sample. */
-float es_reference_variance(const es_reference* reference, uint32_t square, size_t at, float mean);
+double es_reference_variance(const es_reference* reference, uint32_t square, size_t at, float mean);
 /* As after es_reference_begin: no samples. */
 void es_reference_forget(es_reference* reference);
 /* Error, time left and whether a limit is reached, into the stats. */

@@ -49,7 +49,7 @@ es_result es_reference_image(es_reference* r, const char* name, es_image* image)
     for (size_t at = 0; at < (size_t)r->width * r->height * 3; at++) {
         float mean = 0.0f;
         for (uint32_t i = source.first; i <= source.last; i++) mean += es_reference_mean(r, i, at);
-        image->pixels[at] = source.error ? es_sqrt(es_reference_variance(r, source.square, at, mean)) : mean;
+        image->pixels[at] = source.error ? (float)__builtin_sqrt(es_reference_variance(r, source.square, at, mean)) : mean;
     }
     es_fp_leave(environment);
     return ES_OK;

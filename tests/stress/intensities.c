@@ -45,6 +45,8 @@ static void assert_displayed(stress* s, es_renderer* renderer, const char* what)
     es_image_destroy(s->context, &image);
 }
 
+static double reference_error; /* of light times 1 */
+
 /* The radiance with all lamps multiplied. */
 static es_image radiance_of(stress* s, size_t method, double factor)
 {
@@ -60,6 +62,11 @@ static es_image radiance_of(stress* s, size_t method, double factor)
         assert_int_equal(es_reference_begin(reference, s->world), ES_OK);
         assert_int_equal(es_reference_add(reference, 8), ES_OK);
         assert_int_equal(es_reference_image(reference, "radiance", &image), ES_OK);
+        /* the estimate of its error scales too */
+        double error = es_reference_get_stats(reference).error;
+        if (!(error > 0.05 && error < 20)) fail_msg("reference, light times %g: relRMSE is said to be %g", factor, error);
+        if (factor == 1) reference_error = error;
+        if (!(fabs(error / reference_error - 1) < 1e-4)) fail_msg("reference, light times %g: relRMSE is said to be %g, of the light itself %g", factor, error, reference_error);
         es_reference_destroy(reference);
     } else {
         es_renderer_settings settings = settings_of(method);
