@@ -36,6 +36,7 @@ typedef struct benchmark {
 } benchmark;
 /* In the order of the page. */
 static const benchmark benchmarks[] = {
+    {"error", bench_error, bench_error_rows, false},
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},
 };
@@ -85,8 +86,8 @@ static int prepare_directory(const char* path)
 
 int demo_bench(int count, char** arguments)
 {
-    enum { OUT, RUNS, THREADS, ONLY, NO_PEER, QUICK, OPTIONS };
-    static const char* const known[OPTIONS] = {"--out", "--runs", "--threads", "--only", "--no-peer", "--quick"};
+    enum { OUT, RUNS, THREADS, ONLY, NO_PEER, QUICK, SCENE, SIZE, SPP, OPTIONS };
+    static const char* const known[OPTIONS] = {"--out", "--runs", "--threads", "--only", "--no-peer", "--quick", "--scene", "--size", "--spp"};
     char program[DEMO_PATH_SIZE];
     ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
     program[length > 0 ? length : 0] = 0;
@@ -105,7 +106,7 @@ int demo_bench(int count, char** arguments)
         while (option < OPTIONS && strcmp(argument, known[option]) != 0) option++;
         if (option == OPTIONS) {
             const char* nearest = demo_nearest(argument, known, OPTIONS);
-            return demo_refuse("bench: unknown option %s; %s%s", argument, nearest ? "did you mean " : "--out, --runs, --threads, --only, --no-peer and --quick are known",
+            return demo_refuse("bench: unknown option %s; %s%s", argument, nearest ? "did you mean " : "`earthshine help` lists all",
                 nearest ? nearest : "");
         }
         if (option == NO_PEER) options.no_peer = true;
@@ -116,6 +117,10 @@ int demo_bench(int count, char** arguments)
         if (option == RUNS && !demo_parse_uint(arguments[i], 1, 50, &options.runs)) return demo_refuse("--runs %s: a number from 1 to 50 is expected", arguments[i]);
         if (option == THREADS && !demo_parse_uint(arguments[i], 1, 64, &options.threads))
             return demo_refuse("--threads %s: a number from 1 to 64 is expected", arguments[i]);
+        if (option == SPP && !demo_parse_uint(arguments[i], 2, 1 << 20, &options.samples)) return demo_refuse("--spp %s: a number from 2 is expected", arguments[i]);
+        if (option == SIZE && demo_parse_size(arguments[i], &options.width, &options.height) != DEMO_OK) return DEMO_BAD_INPUT;
+        if (option == SCENE && options.scene_count == BENCH_MAX_SCENES) return demo_refuse("--scene: at most %d scenes", BENCH_MAX_SCENES);
+        if (option == SCENE) options.scenes[options.scene_count++] = arguments[i];
         if (option != ONLY) continue;
         if (check_row_id(arguments[i]) != DEMO_OK) return DEMO_BAD_INPUT;
         if (options.only_count == 32) return demo_refuse("--only: at most 32 rows");

@@ -8,7 +8,8 @@
 typedef enum bench_judge {
     BENCH_NONE,           /* a figure without a target */
     BENCH_RATIO_AT_LEAST, /* `ratio` against the targets */
-    BENCH_VALUE_AT_MOST   /* `value` against the targets */
+    BENCH_VALUE_AT_MOST,  /* `value` against the targets */
+    BENCH_VALUE_AT_LEAST
 } bench_judge;
 
 typedef struct bench_row {
@@ -19,9 +20,10 @@ typedef struct bench_row {
     bench_judge judge;
     double must, aim;
     double value, peer_value, ratio; /* NaN: not measured; ratio: how many times better than the peer */
-    char note[200];                  /* why a figure is missing, or what stands behind it */
+    char note[320];                  /* why a figure is missing, or what stands behind it */
 } bench_row;
 
+enum { BENCH_MAX_SCENES = 16 };
 typedef struct bench_options {
     const char* out; /* directory; NULL: none */
     uint32_t runs;
@@ -30,6 +32,10 @@ typedef struct bench_options {
     bool quick; /* fewer settings and repetitions: to see that it runs, not to quote */
     const char* only[32]; /* row ids; none: all */
     size_t only_count;
+    const char* scenes[BENCH_MAX_SCENES]; /* of bench error; none: room, cornell, hall */
+    size_t scene_count;
+    uint32_t width, height; /* of bench error's pictures; 0: 1024 × 768, which the peers' are */
+    uint32_t samples;       /* of bench error's own truths; 0: its choice */
     const char* program; /* path of this program, for the rows that start it */
 } bench_options;
 
@@ -93,7 +99,7 @@ bench_child bench_run_child(const char* const* arguments, const char* variable, 
 typedef enum bench_peer_kind {
     BENCH_LLVMPIPE,    /* its programs for drawing, shading and starting */
     BENCH_EMBREE_RAYS, /* building and tracing rays: rows as "primary intersect1 70k" */
-    BENCH_EMBREE_PATHS /* one diffuse bounce by path tracing, demos/bench_embree_peer.c; to be run by bench_embree_paths */
+    BENCH_EMBREE_PATHS /* one diffuse bounce by path tracing, demos/bench_embree_paths.c */
 } bench_peer_kind;
 typedef struct bench_peer {
     bench_peer_kind kind;
@@ -116,22 +122,12 @@ double bench_peer_value(bench_peer* peer, const char* name); /* median over the 
 /* One program of the kind, with its arguments (NULL at their end, at most six); `threads` for a kind that takes them by the environment. */
 bool bench_peer_run_program(bench_peer* peer, size_t program, const char* const* arguments, const char* threads);
 
-/* bench_embree.c: Embree's path tracer of the room's indirect light (70k triangles, 1024 × 768, one bounce, R2 sequence), time against
- * error. Seconds leave out the primary rays, whose own are `primary_seconds`, and building the hierarchy. */
-typedef struct bench_path_point {
-    uint32_t samples;                          /* a pixel: 1, 2, 4 … */
-    double seconds, relrmse, rell1;            /* without filter */
-    double box_seconds, box_relrmse, box_rell1; /* after its geometry-aware box of 8 × 8, which takes part in the seconds */
-} bench_path_point;
-/* Once more, doubling the samples until relrmse is below 0.05 or the next doubling would end after `limit` seconds; `reference` is float RGB of
- * 1024 × 768 (room_indirect_reference.exr). False with peer->why when it fails. */
-bool bench_embree_paths(bench_peer* peer, const es_image* reference, uint32_t threads, double limit);
-/* Medians over the runs so far; how many points there are. */
-size_t bench_embree_path_points(bench_peer* peer, bench_path_point* points, size_t capacity, double* primary_seconds);
-
-/* bench_speed.c, bench_errors.c */
+/* bench_speed.c, bench_speed_errors.c */
 int bench_speed(const bench_options* options);
 int bench_frame(const bench_options* options);
+/* bench_error.c, bench_error_report.c */
+int bench_error(const bench_options* options);
+size_t bench_error_rows(bench_row* rows, size_t capacity);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */
 es_renderer_settings bench_settings(void);
 void bench_measure_errors(const bench_options* options, const bench_peer* peer, bench_row* rows, size_t count);

@@ -29,7 +29,7 @@ static const peer_kind kinds[] = {
         "LP_NUM_THREADS", "all"},
     [BENCH_EMBREE_RAYS] = {"Embree", "embree", "embree_peer.c", {{"embree_peer", "embree_peer.c", false}}, {"-O3", "-march=native", "-ffast-math"}, {"-lembree3", "-lpthread", "-lm"},
         NULL, "rays"},
-    [BENCH_EMBREE_PATHS] = {"Embree", "embree", "embree_peer.c", {{"embree_paths", "bench_embree_peer.c", true}}, {"-O3", "-march=native", "-ffast-math"},
+    [BENCH_EMBREE_PATHS] = {"Embree", "embree", "embree_peer.c", {{"embree_paths", "bench_embree_paths.c", true}}, {"-O3", "-march=native", "-ffast-math"},
         {"-lembree3", "-lpthread", "-lm"}, NULL, NULL},
 };
 

@@ -8,12 +8,13 @@ static double score(const bench_row* row)
 {
     if (row->judge == BENCH_RATIO_AT_LEAST) return row->ratio / row->must;
     if (row->judge == BENCH_VALUE_AT_MOST && !isnan(row->value)) return row->must / fmax(row->value, row->must * 1e-3);
+    if (row->judge == BENCH_VALUE_AT_LEAST) return row->value / row->must;
     return NAN;
 }
 
 static double aim_score(const bench_row* row)
 {
-    return row->judge == BENCH_RATIO_AT_LEAST ? row->aim / row->must : row->must / row->aim;
+    return row->judge == BENCH_VALUE_AT_MOST ? row->must / row->aim : row->aim / row->must;
 }
 
 enum { LEFT = 170, WIDTH = 880, ROW = 26, TOP = 40, RIGHT = 90 };

@@ -10,8 +10,9 @@ const char* bench_verdict(const bench_row* row)
     bool ratio = row->judge == BENCH_RATIO_AT_LEAST;
     double figure = ratio ? row->ratio : row->value;
     if (isnan(figure)) return "";
-    if (ratio ? figure >= row->aim : figure <= row->aim) return "aim";
-    if (ratio ? figure >= row->must : figure <= row->must) return "must";
+    bool most = row->judge == BENCH_VALUE_AT_MOST;
+    if (most ? figure <= row->aim : figure >= row->aim) return "aim";
+    if (most ? figure <= row->must : figure >= row->must) return "must";
     return "missed";
 }
 

@@ -49,7 +49,8 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
 /* Whole-string numbers within a range; false otherwise. */
 bool demo_parse_uint(const char* text, uint32_t minimum, uint32_t maximum, uint32_t* value);
 bool demo_parse_double(const char* text, double minimum, double maximum, double* value);
-/* "A:B", B > A. */
+/* "WIDTHxHEIGHT", and below "A:B", B > A; DEMO_BAD_INPUT after one line on stderr. */
+int demo_parse_size(const char* text, uint32_t* width, uint32_t* height);
 int demo_parse_frames(const char* text, uint32_t* first, uint32_t* end);
 const char* demo_method_name(uint32_t method);
 

@@ -35,9 +35,10 @@ static const char usage[] =
     "             --diff OUT.png --scale X              where the error lies, in false colour, brightest at X\n"
     "             --map absolute|relative|signed|flip|hdr-flip    what --diff shows\n"
     "             --display-referred --threads N        0 … 1 as displayed, not radiance; all threads unless said\n"
-    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), frame, all; tables, JSON, CSV, SVG and one\n"
-    "                                                   page DIR/index.html\n"
+    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), error, frame, all; tables, JSON, CSV, SVG\n"
+    "                                                   and one page, DIR/index.html\n"
     "             --threads N (2) --runs N (5) --only ROW --no-peer --quick\n"
+    "             --scene NAME|FILE … --size WxH --spp N    what error looks at (room, cornell, hall; 1024x768), samples of its truths\n"
     "  earthshine help | --version\n"
     "play takes render's options too; with --frames or --out it needs no window.\n";
 

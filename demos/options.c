@@ -29,7 +29,7 @@ static const char* const method_names[] = {"none", "ism", "classic", "vpl-traced
 
 const char* demo_method_name(uint32_t method) { return method < 4 ? method_names[method] : "?"; }
 
-static int parse_size(const char* text, demo_options* options)
+int demo_parse_size(const char* text, uint32_t* out_width, uint32_t* out_height)
 {
     char copy[32];
     snprintf(copy, sizeof copy, "%s", text);
@@ -41,9 +41,8 @@ static int parse_size(const char* text, demo_options* options)
         return demo_refuse("--size %s: WIDTHxHEIGHT is expected, such as 1024x768", text);
     if (width < 1 || height < 1 || width > ES_RASTER_MAX_SIZE || height > ES_RASTER_MAX_SIZE)
         return demo_refuse("--size %s: from 1x1 to %dx%d is accepted", text, ES_RASTER_MAX_SIZE, ES_RASTER_MAX_SIZE);
-    options->width = width;
-    options->height = height;
-    options->size_given = true;
+    *out_width = width;
+    *out_height = height;
     return DEMO_OK;
 }
 
@@ -101,7 +100,8 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
         options->out = value;
         return DEMO_OK;
     case SIZE:
-        return parse_size(value, options);
+        options->size_given = true;
+        return demo_parse_size(value, &options->width, &options->height);
     case FRAMES:
         options->frames_given = true;
         return demo_parse_frames(value, &options->first, &options->end);

@@ -5,7 +5,7 @@
 
 #include "demo.h"
 
-enum { PLOT_COLOURS = 8, PLOT_MAX_SERIES = 24, PLOT_MAX_LINES = 6, PLOT_MAX_PARTS = 14, PLOT_NAME_SIZE = 96, PLOT_NOTE_SIZE = 200, PLOT_HEADLINE_SIZE = 400, PLOT_CAPTION_SIZE = 700 };
+enum { PLOT_COLOURS = 8, PLOT_MAX_SERIES = 24, PLOT_MAX_LINES = 6, PLOT_MAX_PARTS = 14, PLOT_NAME_SIZE = 96, PLOT_NOTE_SIZE = 200, PLOT_HEADLINE_SIZE = 700, PLOT_CAPTION_SIZE = 700 };
 
 /* ---- curves (plot_curves.c) -------------------------------------------------------------------------------------- */
 

@@ -305,11 +305,17 @@ expect 0 bench speed --runs 1 --no-peer --only gbuffer-70k --out figures
 says '^gbuffer-70k +[0-9.]+ ms '
 for file in speed.json speed.csv speed-targets.svg index.html; do [ -s figures/$file ] || fail "no $file"; done
 expect 0 bench frame --runs 1 --no-peer --out figures
+refused '--spp 1' bench error --spp 1
+refused '--size 0x5' bench error --size 0x5
+refused "nearest is 'cornell'" bench error --scene cornel --out figures
+expect 0 bench error --quick --no-peer --scene cornell --size 48x32 --spp 2 --out figures
+says '^error-cornell-best +[0-9.]+ relRMSE'
+[ "$(find figures/references -name 'cornell-*.exr' | wc -l)" = 8 ] || fail 'truths are not kept: two halves of a picture and of three frames'
 if command -v python3 >/dev/null; then
     checks=$((checks + 1))
     python3 - <<'PYTHON' >out 2>err || fail 'the files of bench are not as described'
 import glob, json, re, xml.etree.ElementTree as tree
-for name in ('speed', 'frame'):
+for name in ('speed', 'frame', 'error'):
     report = json.load(open(f'figures/{name}.json'))
     assert set(report['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit'}, report['machine']
     assert report['date'].startswith('20') and report['rows'], report
@@ -317,11 +323,19 @@ for name in ('speed', 'frame'):
         assert set(row) >= {'id', 'value', 'unit', 'peer', 'peer_value', 'ratio'}, row
 row, = json.load(open('figures/speed.json'))['rows']
 assert row['id'] == 'gbuffer-70k' and row['value'] > 0 and row['unit'] == 'ms' and row['ratio'] is None, row
+error = json.load(open('figures/error.json'))
+assert {row['id'] for row in error['rows']} >= {'reference-room-0.05', 'references-agree', 'indirect-50ms'}
+assert len(error['points']) >= 10, len(error['points'])
+for point in error['points']:
+    assert set(point) >= {'scene', 'series', 'label', 'settings', 'ms', 'relrmse', 'relmse', 'flip', 'flip_whole', 'flicker'}, point
+    assert point['scene'] == 'cornell' and point['ms'] > 0 and point['flip'] >= 0, point
+assert [plot['id'] for plot in error['plots']][:3] == ['cornell-error', 'cornell-flip', 'cornell-flicker']
+assert all(plot['headline'] for report in (error,) for plot in report['plots'])
 for drawing in glob.glob('figures/*.svg'):
     tree.parse(drawing)
 text = open('figures/index.html').read()
 page = tree.fromstring(text)  # well-formed as XML too
-assert [s.get('id') for s in page.iter('section')] == ['speed', 'frame'], 'a run keeps the sections of others'
+assert [s.get('id') for s in page.iter('section')] == ['error', 'speed', 'frame'], 'a run keeps the sections of others'
 names = {element.tag for element in page.iter()}
 assert not names & {'script', 'link', 'img', 'iframe', 'object', 'image', 'use'}, names
 assert not re.search(r'https?:|url\(|@import|src=', text), 'the page loads something'
