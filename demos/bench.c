@@ -39,6 +39,7 @@ static const benchmark benchmarks[] = {
     {"error", bench_error, bench_error_rows, false},
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},
+    {"rays", bench_rays, bench_rays_rows, false},
 };
 enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0], MAX_ROWS = 256 };
 

@@ -122,6 +122,10 @@ double bench_peer_value(bench_peer* peer, const char* name); /* median over the 
 /* One program of the kind, with its arguments (NULL at their end, at most six); `threads` for a kind that takes them by the environment. */
 bool bench_peer_run_program(bench_peer* peer, size_t program, const char* const* arguments, const char* threads);
 
+/* bench_rays.c */
+int bench_rays(const bench_options* options);
+size_t bench_rays_rows(bench_row* rows, size_t capacity);
+
 /* bench_speed.c, bench_speed_errors.c */
 int bench_speed(const bench_options* options);
 int bench_frame(const bench_options* options);

@@ -182,6 +182,73 @@ ES_API es_result es_reference_save(es_reference* reference, const char* path);
  * FILE_DAMAGED when it lacks sums or they are no numbers; a file that is refused changes nothing. */
 ES_API es_result es_reference_resume(es_reference* reference, const char* path);
 
+/* ---- rays ---------------------------------------------------------------------------------------------------------------------------- */
+
+/* What a ray meets in a draw list (es_world_draw_list, or one's own): for picking, lines of sight, sensors, and the tracers above.
+ *
+ * Eight children a node, built by the surface area heuristic, refit when only vertices or transforms moved. Triangles are kept in world
+ * space. The test of a ray with a triangle is watertight (Woop, Benthin and Wald 2013): a ray through a shared edge or vertex hits at least one
+ * of its triangles. Both faces are hit; what a back face means is for the caller.
+ *
+ * The same rays give the same hits, bit for bit, on every instruction set and for any number of threads. Where two triangles are hit
+ * at the same distance the lower primitive wins; of overlapping triangles in one plane, whose distances differ by rounding only, always the
+ * same one.
+ *
+ *     es_bvh* bvh;
+ *     es_bvh_create(context, &bvh);
+ *     es_bvh_update(bvh, es_world_draw_list(world));                         // after each step of the world
+ *     es_ray ray = {{eye.x, eye.y, eye.z}, 0, {d.x, d.y, d.z}, INFINITY};
+ *     es_hit hit;
+ *     es_bvh_closest(bvh, ES_RAYS_SINGLE, &ray, 1, &hit);
+ *     if (hit.primitive != ES_NO_PRIMITIVE) picked = es_bvh_primitives(bvh)[hit.primitive].instance;
+ */
+#define ES_NO_PRIMITIVE 0xffffffffu
+
+/* Points origin + t direction with min < t < max. The direction need not be unit but must be finite and not zero; max may be infinite. Rays
+ * that break this harm nothing and hit anything or nothing. */
+typedef struct es_ray { float origin[3], min, direction[3], max; } es_ray;
+
+/* primitive ES_NO_PRIMITIVE: nothing was hit and t is the ray's max. The point is (1 - u - v) a + u b + v c of the triangle. */
+typedef struct es_hit { float t, u, v; uint32_t primitive; } es_hit;
+
+typedef struct es_bvh_primitive { uint32_t instance, triangle; } es_bvh_primitive; /* index into the draw list; triangle of its mesh */
+
+typedef struct es_bvh es_bvh;
+
+/* Empty: nothing hits. One thread at a time changes a hierarchy; any number trace through it meanwhile unchanged. */
+ES_API es_result es_bvh_create(es_context* context, es_bvh** bvh);
+ES_API void es_bvh_destroy(es_bvh* bvh); /* NULL: nothing */
+/* From nothing, or again. The list is not kept. An empty list gives a hierarchy that nothing hits. INVALID_ARGUMENT beyond 2^31 - 2 triangles
+ * or vertices; after a failure the hierarchy is to be built or destroyed, and nothing else. */
+ES_API es_result es_bvh_build(es_bvh* bvh, const es_draw_list* list);
+/* The same instances, meshes and triangles, moved. WRONG_STATE when the list has others. */
+ES_API es_result es_bvh_refit(es_bvh* bvh, const es_draw_list* list);
+/* Build when the list has other triangles than the hierarchy or when refitting has made rays 1.5 times as expensive as they were at
+ * the last build, by the surface area heuristic; else refit when something moved (by the meshes' revisions and the transforms); else nothing. */
+ES_API es_result es_bvh_update(es_bvh* bvh, const es_draw_list* list);
+
+ES_API uint32_t es_bvh_primitive_count(const es_bvh* bvh);
+/* es_hit.primitive is an index here: the draw list's triangles in order, instance by instance. Valid until the next build. */
+ES_API const es_bvh_primitive* es_bvh_primitives(const es_bvh* bvh);
+/* Corners in world space. */
+ES_API void es_bvh_triangle(const es_bvh* bvh, uint32_t primitive, es_vec3 corners[3]);
+ES_API void es_bvh_bounds(const es_bvh* bvh, es_vec3* minimum, es_vec3* maximum); /* empty: minimum > maximum */
+
+typedef enum es_ray_kind {
+    ES_RAYS_SINGLE,     /* each by itself: what random directions want */
+    ES_RAYS_COHERENT    /* runs of eight neighbours go together: from one pixel block, or towards one light */
+} es_ray_kind;
+
+/* On the calling thread, which may be any: one's own, or a task's of the context. The results do not depend on `kind`. */
+ES_API void es_bvh_closest(const es_bvh* bvh, es_ray_kind kind, const es_ray* rays, uint32_t count, es_hit* hits);
+/* blocked[i] is 1 when anything is hit, else 0. */
+ES_API void es_bvh_any(const es_bvh* bvh, es_ray_kind kind, const es_ray* rays, uint32_t count, uint8_t* blocked);
+
+/* Where a ray leaves a surface: the point, moved along the geometric normal (unit, on the side the ray goes to) far enough that rounding
+ * of the point and of the hit test cannot bring the surface itself back, and no further: a few units in the last place of the largest
+ * coordinate (after Wächter and Binder 2019). So rays need no minimum that would depend on the scene's size. */
+ES_API es_vec3 es_offset_origin(es_vec3 point, es_vec3 geometric_normal);
+
 /* ---- error: how far a picture is from the truth ------------------------------------------------------------------------------------ */
 
 /* Of a picture A against a reference B, over all pixels and the channels compared, with d = A - B. Deterministic: own elementary
