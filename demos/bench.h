@@ -34,7 +34,7 @@ typedef struct bench_options {
     size_t only_count;
     const char* scenes[BENCH_MAX_SCENES]; /* of bench error; none: room, cornell, hall */
     size_t scene_count;
-    uint32_t width, height; /* of bench error's pictures; 0: 1024 × 768, which the peers' are */
+    uint32_t width, height; /* of the pictures of error and scale; 0: 1024 × 768, which the peers' are */
     uint32_t samples;       /* of bench error's own truths; 0: its choice */
     const char* program; /* path of this program, for the rows that start it */
 } bench_options;
@@ -73,6 +73,7 @@ void bench_report_bars(bench_report* report, const plot_bars* plot);
 void bench_report_figure(bench_report* report, const char* id, const char* headline, const char* caption, demo_text* svg, demo_text* table, demo_text* csv);
 /* Writes everything (nothing without --out) and frees the report. Rows with targets are drawn against them. */
 int bench_report_write(bench_report* report, const bench_options* options, const bench_row* rows, size_t count, const es_context* context);
+void bench_report_free(bench_report* report); /* of a report that is not written */
 /* The rows as a table on standard output. */
 void bench_print(const bench_row* rows, size_t count);
 const char* bench_verdict(const bench_row* row); /* "aim", "must", "missed", "" */
@@ -132,6 +133,9 @@ int bench_frame(const bench_options* options);
 /* bench_error.c, bench_error_report.c */
 int bench_error(const bench_options* options);
 size_t bench_error_rows(bench_row* rows, size_t capacity);
+/* bench_scale.c */
+int bench_scale(const bench_options* options);
+size_t bench_scale_rows(bench_row* rows, size_t capacity);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */
 es_renderer_settings bench_settings(void);
 void bench_measure_errors(const bench_options* options, const bench_peer* peer, bench_row* rows, size_t count);

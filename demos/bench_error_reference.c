@@ -140,7 +140,7 @@ bool error_trace_curve(es_context* context, es_world* world, const error_truth* 
     es_image indirect = {0}, noise = {0};
     for (uint32_t wanted = 1; works && wanted <= samples && curve->count < ERROR_MAX_POINTS; wanted *= 2) {
         es_reference_stats stats = es_reference_get_stats(reference);
-        if (stats.seconds >= seconds && wanted > 2) break; /* an error needs two samples */
+        if (stats.seconds >= seconds && wanted > 4) break; /* three points say where the curve leads */
         works = es_reference_add(reference, wanted - (uint32_t)stats.samples) == ES_OK;
         es_image_destroy(context, &indirect);
         works = works && es_reference_image(reference, "indirect", &indirect) == ES_OK;

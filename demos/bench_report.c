@@ -333,9 +333,8 @@ static int write_all(bench_report* report, const bench_options* options, const b
     return code;
 }
 
-int bench_report_write(bench_report* report, const bench_options* options, const bench_row* rows, size_t count, const es_context* context)
+void bench_report_free(bench_report* report)
 {
-    int code = options->out ? write_all(report, options, rows, count, context) : DEMO_OK;
     demo_text_free(&report->figures);
     demo_text_free(&report->members);
     for (size_t i = 0; i < report->plot_count; i++) {
@@ -343,5 +342,11 @@ int bench_report_write(bench_report* report, const bench_options* options, const
         demo_text_free(&report->plots[i].csv);
     }
     report->plot_count = 0;
+}
+
+int bench_report_write(bench_report* report, const bench_options* options, const bench_row* rows, size_t count, const es_context* context)
+{
+    int code = options->out ? write_all(report, options, rows, count, context) : DEMO_OK;
+    bench_report_free(report);
     return code;
 }

@@ -305,6 +305,8 @@ expect 0 bench speed --runs 1 --no-peer --only gbuffer-70k --out figures
 says '^gbuffer-70k +[0-9.]+ ms '
 for file in speed.json speed.csv speed-targets.svg index.html; do [ -s figures/$file ] || fail "no $file"; done
 expect 0 bench frame --runs 1 --no-peer --out figures
+expect 0 bench scale --quick --only scale-threads --size 64x48 --threads 2 --out figures
+says '^scale-threads +[0-9.]+ x '
 refused '--spp 1' bench error --spp 1
 refused '--size 0x5' bench error --size 0x5
 refused "nearest is 'cornell'" bench error --scene cornel --out figures
@@ -315,7 +317,7 @@ if command -v python3 >/dev/null; then
     checks=$((checks + 1))
     python3 - <<'PYTHON' >out 2>err || fail 'the files of bench are not as described'
 import glob, json, re, xml.etree.ElementTree as tree
-for name in ('speed', 'frame', 'error'):
+for name in ('speed', 'frame', 'error', 'scale'):
     report = json.load(open(f'figures/{name}.json'))
     assert set(report['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit'}, report['machine']
     assert report['date'].startswith('20') and report['rows'], report
@@ -331,11 +333,13 @@ for point in error['points']:
     assert point['scene'] == 'cornell' and point['ms'] > 0 and point['flip'] >= 0, point
 assert [plot['id'] for plot in error['plots']][:3] == ['cornell-error', 'cornell-flip', 'cornell-flicker']
 assert all(plot['headline'] for report in (error,) for plot in report['plots'])
+scale = json.load(open('figures/scale.json'))
+assert all(point['axis'] == 'threads' and point['ms'] >= max(point['passes'].values()) for point in scale['points']) and scale['points']
 for drawing in glob.glob('figures/*.svg'):
     tree.parse(drawing)
 text = open('figures/index.html').read()
 page = tree.fromstring(text)  # well-formed as XML too
-assert [s.get('id') for s in page.iter('section')] == ['error', 'speed', 'frame'], 'a run keeps the sections of others'
+assert [s.get('id') for s in page.iter('section')] == ['error', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
 names = {element.tag for element in page.iter()}
 assert not names & {'script', 'link', 'img', 'iframe', 'object', 'image', 'use'}, names
 assert not re.search(r'https?:|url\(|@import|src=', text), 'the page loads something'
