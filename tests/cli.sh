@@ -174,6 +174,48 @@ refused 'folder' render folder --hash
 for file in empty.glb empty.gltf short.glb letter.glb cut.gltf old.gltf noise.glb one.exr; do refused "$file" render $file --hash; done
 grep -q EARTHSHINE_WITH_TINYGLTF:BOOL=OFF "$build/CMakeCache.txt" || refused 'ACME_teapots' render acme.gltf --hash
 
+# ---- reference -------------------------------------------------------------------------------------------------------
+ray=(--size 12x9 --threads 2)
+expect 0 reference cornell "${ray[@]}" --spp 3 --out half.exr --hash
+expect 0 reference cornell "${ray[@]}" --spp 5 --hash
+cp out whole
+expect 0 reference cornell "${ray[@]}" --spp 5 --resume half.exr --hash --stats reference.json
+cmp -s out whole || fail 'samples of two calls are not those of one'
+[ -s reference.json ] || fail 'no statistics of a reference'
+refused 'scene' reference
+refused 'nothing would come of it' reference cornell
+refused 'option of render' reference cornell --hash --gi ism
+refused 'option of reference' render cornell --hash --spp 4
+refused 'reference.samples' reference cornell --hash --spp many
+refused 'reference.bounces' reference cornell --hash --bounces 65
+refused 'reference.error' reference cornell --hash --error nan
+refused 'setting of render' reference cornell --hash --set exposure=1
+refused 'bounce-1' reference cornell --hash --image bounce-2
+refused 'one frame is expected' reference cornell --hash --frames 0:2 --resume half.exr
+refused 'missing.exr' reference cornell "${ray[@]}" --hash --resume missing.exr
+refused 'another world' reference cornell --size 9x12 --hash --resume half.exr
+refused 'another world' reference cornell "${ray[@]}" --set reference.seed=1 --hash --resume half.exr
+refused 'it has no sums' reference cornell "${ray[@]}" --hash --resume one.exr
+head -c 1000 half.exr >broken.exr
+refused 'broken.exr' reference cornell "${ray[@]}" --hash --resume broken.exr
+refused 'no directory' reference cornell --spp 1 --out nowhere/a.exr
+[ ! -e a.exr ] || fail 'a refusal leaves files behind'
+
+# ---- anything at all -------------------------------------------------------------------------------------------------
+# Arguments by chance, the same in every run, with one among them that no command takes.
+pieces=('' ' ' % %s%n.png -- - = --= -- 0 -1 1e999 nan 0x10 99999999999999999999 $'two\nlines' $'\e[2J\a' $'\xff\xfe' ../../.. cornell /dev/null "$(printf 'long%.0s' {1..600})"
+    --size --size=0x7 --frames --frames=: --out --out=%d.exr --set --set==1 --set=vpl.count= --set=reference.seed=0x1 --image --image=depth --hash --stats --resume --spp=-0
+    --seconds=inf --error --bounces=1e1 --fps= --threads=65536 --isa=avx --gi --no-skip --no-skip=yes)
+RANDOM=7
+for command in render reference; do
+    for turn in {1..25}; do
+        arguments=()
+        for ((i = RANDOM % 6; i >= 0; i--)); do arguments+=("${pieces[RANDOM % ${#pieces[@]}]}"); done
+        place=$((RANDOM % (${#arguments[@]} + 1)))
+        refused '' "$command" "${arguments[@]:0:place}" --frobnicate "${arguments[@]:place}"
+    done
+done
+
 # ---- compare ---------------------------------------------------------------------------------------------------------
 expect 0 render cornell "${small[@]}" --out a.exr --image direct
 expect 0 render cornell "${small[@]}" --out b.exr --image direct --frames 1:2 --fps 2
