@@ -37,6 +37,7 @@ typedef struct benchmark {
 /* In the order of the page. */
 static const benchmark benchmarks[] = {
     {"error", bench_error, bench_error_rows, false},
+    {"ledger", bench_ledger, NULL, false},
     {"scale", bench_scale, bench_scale_rows, false},
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},

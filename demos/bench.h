@@ -32,10 +32,10 @@ typedef struct bench_options {
     bool quick; /* fewer settings and repetitions: to see that it runs, not to quote */
     const char* only[32]; /* row ids; none: all */
     size_t only_count;
-    const char* scenes[BENCH_MAX_SCENES]; /* of bench error; none: room, cornell, hall */
+    const char* scenes[BENCH_MAX_SCENES]; /* of bench error and ledger; none: room, cornell, hall */
     size_t scene_count;
-    uint32_t width, height; /* of the pictures of error and scale; 0: 1024 × 768, which the peers' are */
-    uint32_t samples;       /* of bench error's own truths; 0: its choice */
+    uint32_t width, height; /* of the pictures; 0: 1024 × 768 for error and scale, which the peers' are, 384 × 288 for ledger */
+    uint32_t samples;       /* of the truths of error and ledger; 0: their choice */
     const char* program; /* path of this program, for the rows that start it */
 } bench_options;
 
@@ -136,6 +136,8 @@ size_t bench_error_rows(bench_row* rows, size_t capacity);
 /* bench_scale.c */
 int bench_scale(const bench_options* options);
 size_t bench_scale_rows(bench_row* rows, size_t capacity);
+/* bench_ledger.c */
+int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */
 es_renderer_settings bench_settings(void);
 void bench_measure_errors(const bench_options* options, const bench_peer* peer, bench_row* rows, size_t count);

@@ -16,8 +16,8 @@ set(demo_compiler "${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}")
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 
 set(demo_sources bench.c bench_child.c bench_error.c bench_error_embree.c bench_error_measure.c bench_error_reference.c bench_error_report.c bench_error_table.c
-  bench_page.c bench_peer.c bench_plot.c bench_rays.c bench_report.c bench_scale.c bench_speed.c bench_speed_errors.c bench_table.c
-  compare.c fly_camera.c font.c image_layer.c machine.c main.c messages.c options.c output.c overlay.c play.c plot_bars.c plot_curves.c plot_svg.c reference.c render.c session.c settings.c text.c)
+  bench_ledger.c bench_page.c bench_peer.c bench_plot.c bench_rays.c bench_report.c bench_scale.c bench_speed.c bench_speed_errors.c bench_table.c
+  compare.c fly_camera.c font.c image_layer.c ledger_pictures.c ledger_split.c machine.c main.c messages.c options.c output.c overlay.c play.c plot_bars.c plot_curves.c plot_svg.c reference.c render.c session.c settings.c text.c)
 list(TRANSFORM demo_sources PREPEND ${CMAKE_SOURCE_DIR}/demos/)
 
 # earthshine_program(TARGET NAME LIBRARY FLAGS…): one program over one build of the library.

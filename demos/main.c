@@ -35,10 +35,10 @@ static const char usage[] =
     "             --diff OUT.png --scale X              where the error lies, in false colour, brightest at X\n"
     "             --map absolute|relative|signed|flip|hdr-flip    what --diff shows\n"
     "             --display-referred --threads N        0 … 1 as displayed, not radiance; all threads unless said\n"
-    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), error, scale, frame, all; tables, JSON,\n"
-    "                                                   CSV, SVG and one page, DIR/index.html\n"
+    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), error, ledger, scale, frame, all; tables,\n"
+    "                                                   JSON, CSV, SVG and one page, DIR/index.html\n"
     "             --threads N (2) --runs N (5) --only ROW --no-peer --quick\n"
-    "             --scene NAME|FILE … --size WxH --spp N    what error looks at (room, cornell, hall; 1024x768), samples of its truths\n"
+    "             --scene NAME|FILE … --size WxH --spp N    what error and ledger look at, samples of their truths\n"
     "  earthshine help | --version\n"
     "play takes render's options too; with --frames or --out it needs no window.\n";
 

@@ -352,6 +352,10 @@ says '^scale-threads +[0-9.]+ x '
 refused '--spp 1' bench error --spp 1
 refused '--size 0x5' bench error --size 0x5
 refused "nearest is 'cornell'" bench error --scene cornel --out figures
+refused "nearest is 'cornell'" bench ledger --scene cornel --out figures
+expect 0 bench ledger --quick --scene cornell --size 48x32 --spp 32 --out figures
+says '^ledger-cornell-total +[0-9.]+ relRMSE'
+says '^cornell: the .* most, .* unexplained'
 expect 0 bench error --quick --no-peer --scene cornell --size 48x32 --spp 2 --out figures
 says '^error-cornell-best +[0-9.]+ relRMSE'
 [ "$(find figures/references -name 'cornell-*.exr' | wc -l)" = 8 ] || fail 'truths are not kept: two halves of a picture and of three frames'
@@ -359,7 +363,7 @@ if command -v python3 >/dev/null; then
     checks=$((checks + 1))
     python3 - <<'PYTHON' >out 2>err || fail 'the files of bench are not as described'
 import glob, json, re, xml.etree.ElementTree as tree
-for name in ('speed', 'frame', 'error', 'scale'):
+for name in ('speed', 'frame', 'error', 'scale', 'ledger'):
     report = json.load(open(f'figures/{name}.json'))
     assert set(report['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit'}, report['machine']
     assert report['date'].startswith('20') and report['rows'], report
@@ -377,14 +381,20 @@ assert [plot['id'] for plot in error['plots']][:3] == ['cornell-error', 'cornell
 assert all(plot['headline'] for report in (error,) for plot in report['plots'])
 scale = json.load(open('figures/scale.json'))
 assert all(point['axis'] == 'threads' and point['ms'] >= max(point['passes'].values()) for point in scale['points']) and scale['points']
+rows = {row['id']: row['value'] for row in json.load(open('figures/ledger.json'))['rows']}
+causes = ['temporal', 'number', 'interleave', 'visibility', 'bound', 'light-view', 'quantisation', 'unexplained']
+shares = [rows['ledger-cornell-' + cause] for cause in causes]
+assert min(abs(sum(shares[:-1]) + sign * shares[-1] - 100) for sign in (1, -1)) < 1e-4, shares  # of the last one the size
+assert abs(sum(rows[f'ledger-cornell-{cause}-relative'] for cause in causes) - 100) < 1e-4, rows
+assert rows['ledger-cornell-temporal'] == 0 and rows['ledger-cornell-total'] > 0, rows
 for drawing in glob.glob('figures/*.svg'):
     tree.parse(drawing)
 text = open('figures/index.html').read()
 page = tree.fromstring(text)  # well-formed as XML too
-assert [s.get('id') for s in page.iter('section')] == ['error', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
+assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
 names = {element.tag for element in page.iter()}
-assert not names & {'script', 'link', 'img', 'iframe', 'object', 'image', 'use'}, names
-assert not re.search(r'https?:|url\(|@import|src=', text), 'the page loads something'
+assert not names & {'script', 'link', 'iframe', 'object', 'image', 'use'}, names
+assert not re.search(r'https?:|url\(|@import|src="(?!data:image/png;base64,)', text), 'the page loads something'
 ids = [element.get('id') for element in page.iter() if element.get('id')]
 assert len(ids) == len(set(ids)), 'an id is there twice'
 for link in page.iter('a'):
