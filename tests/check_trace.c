@@ -186,6 +186,59 @@ static void test_instruction_sets_agree(void** state)
     es_context_destroy(context);
 }
 
+/* Rays from one point or towards one, eight of one octant or not, hit the same together as alone. */
+static void test_together(void** state)
+{
+    es_context* context = make_context(1);
+    soup* s = malloc(sizeof *s);
+    es_ray* rays = malloc(RAYS * sizeof *rays);
+    es_hit *alone = calloc(RAYS, sizeof *alone), *together = calloc(RAYS, sizeof *together);
+    uint8_t any_alone[RAYS], any_together[RAYS];
+    es_bvh* bvh;
+    uint32_t found = 0;
+    assert_int_equal(es_bvh_create(context, &bvh), ES_OK);
+    for (int kind = 0; kind < SOUP_KINDS; kind++)
+        for (uint32_t shape = 0; shape < 4; shape++) {
+            fill_soup(s, (soup_kind)kind, 31u + (uint32_t)kind);
+            assert_int_equal(es_bvh_build(bvh, &s->list), ES_OK);
+            for (uint32_t i = 0; i < RAYS; i++) {
+                uint32_t group = i / 8, n = i * 8, t = es_random_u32(32, group) % TRIANGLES;
+                es_ray* r = &rays[i];
+                for (int k = 0; k < 3; k++) {
+                    float target = s->positions[t * 12 + (uint32_t)k];
+                    float aim = es_random_float(33, group * 4 + (uint32_t)k) * 2.0f - 1.0f, spread = shape < 2 ? 0.05f : 0.4f;
+                    r->direction[k] = aim + spread * (es_random_float(34, n++) - 0.5f);
+                    if (group % 5 == 0 && k == (int)(group % 3)) r->direction[k] = 0.0f;
+                    /* from one point, or towards one */
+                    r->origin[k] = target - (shape & 1 ? r->direction[k] : aim);
+                }
+                r->min = i % 5 == 0 ? 0.5f : 0.0f;
+                r->max = i % 4 == 0 ? 1.5f : i % 16 == 1 ? 0.9f : 1e30f;
+            }
+#ifndef ES_TRAP_FP
+            if (shape == 3) rays[17].direction[1] = rays[90].origin[0] = __builtin_nanf(""); /* harms none of its neighbours */
+#endif
+            es_bvh_closest(bvh, ES_RAYS_SINGLE, rays, RAYS, alone);
+            es_bvh_closest(bvh, ES_RAYS_COHERENT, rays, RAYS, together);
+            es_bvh_any(bvh, ES_RAYS_SINGLE, rays, RAYS, any_alone);
+            es_bvh_any(bvh, ES_RAYS_COHERENT, rays, RAYS, any_together);
+            assert_memory_equal(alone, together, RAYS * sizeof *alone);
+            assert_memory_equal(any_alone, any_together, RAYS);
+            for (uint32_t i = 0; i < RAYS; i++) found += any_alone[i];
+            /* fewer than eight are left at the end */
+            memset(together, 0, RAYS * sizeof *together);
+            es_bvh_closest(bvh, ES_RAYS_COHERENT, rays, 21, together);
+            assert_memory_equal(alone, together, 21 * sizeof *alone);
+        }
+    assert_true(found > RAYS * SOUP_KINDS);
+    es_bvh_destroy(bvh);
+    free(together);
+    free(alone);
+    free(rays);
+    free(s);
+    es_context_destroy(context);
+}
+
 /* A closed room seen from inside: rays through the corners and edges of its triangles do not get out. */
 static void test_watertight(void** state)
 {
@@ -332,6 +385,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_against_all_triangles),
         cmocka_unit_test(test_instruction_sets_agree),
+        cmocka_unit_test(test_together),
         cmocka_unit_test(test_watertight),
         cmocka_unit_test(test_refit),
         cmocka_unit_test(test_empty_and_threads),

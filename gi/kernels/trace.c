@@ -10,13 +10,23 @@
  *
  * A hit counts when it is nearer than the nearest so far, or as near with a lower primitive. Boxes are passed by only when they begin
  * beyond the nearest hit, so the order of traversal does not matter.
+ *
+ * Rays that go together: eight of one octant share a traversal. A node's boxes are met with the intervals of their origins and inverses, whose
+ * distances enclose each ray's, as subtraction and multiplication round monotonically; a block's box is then met with each ray, by the
+ * operations it would meet alone, and its triangles with the rays that meet the box. Thus every ray looks at the blocks it could hit and
+ * has the same hits as alone.
  */
 #include "gi/kernel_table.h"
 #include "gi/reference/bvh_nodes.h"
 #include "platform/simd.h"
 
-/* 1 + 2 gamma(3), rounded up */
-#define FAR_MARGIN 1.00000072f
+/* 1 + 2 gamma(3) is 1.00000072; the rest leaves room for NEAR_MARGIN */
+#define FAR_MARGIN 1.0000305f
+/* By rounding alone a hit may be nearer than its block's box begins, mostly by a few units in the last place. Hits are compared by the greater of
+ * their distance and begin · NEAR_MARGIN: then what lies in a box that begins beyond nearest · FAR_MARGIN is farther than nearest whatever
+ * its rounding, as (1 + 30.5e-6) (1 - 29e-6) less two roundings of 6e-8 is above 1 by more than a unit in the last place. So which boxes were
+ * looked at before, and in what order, decides nothing. */
+#define NEAR_MARGIN 0.999971f
 /* stands for the inverse of a direction component of zero: finite, so that a plane through the origin gives 0
  * and not NaN, and so small that the distance to any plane stays finite */
 #define STEEP 1e28f
@@ -28,29 +38,27 @@ typedef struct ray_setup {
     vf sx, sy, sz;                    /* shear and scale */
 } ray_setup;
 
-static inline ray_setup prepare(const es_ray* ray)
+VINL void prepare(const es_ray* ray, ray_setup* s)
 {
-    ray_setup s;
     for (int k = 0; k < 3; k++) {
         float d = ray->direction[k];
         bool steep = d <= 1e-28f && d >= -1e-28f, negative = d < 0.0f && !steep;
         float origin = ray->origin[k], inverse = steep ? STEEP : 1.0f / d;
-        s.origin[k] = vf_set1(origin);
+        s->origin[k] = vf_set1(origin);
         /* a ray within the plane of a box's far side would leave it at 0 · STEEP */
-        s.far_origin[k] = vf_set1(steep ? origin - (1.2e-7f * __builtin_fabsf(origin) + 1e-20f) : origin);
-        s.inverse[k] = vf_set1(inverse);
-        s.near_plane[k] = negative ? 3 + k : k;
-        s.far_plane[k] = negative ? k : 3 + k;
+        s->far_origin[k] = vf_set1(steep ? origin - (1.2e-7f * __builtin_fabsf(origin) + 1e-20f) : origin);
+        s->inverse[k] = vf_set1(inverse);
+        s->near_plane[k] = negative ? 3 + k : k;
+        s->far_plane[k] = negative ? k : 3 + k;
     }
     float ax = __builtin_fabsf(ray->direction[0]), ay = __builtin_fabsf(ray->direction[1]), az = __builtin_fabsf(ray->direction[2]);
-    s.kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
-    s.kx = s.kz == 2 ? 0 : s.kz + 1;
-    s.ky = s.kx == 2 ? 0 : s.kx + 1;
-    float scale = 1.0f / ray->direction[s.kz];
-    s.sx = vf_set1(ray->direction[s.kx] * scale);
-    s.sy = vf_set1(ray->direction[s.ky] * scale);
-    s.sz = vf_set1(scale);
-    return s;
+    s->kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
+    s->kx = s->kz == 2 ? 0 : s->kz + 1;
+    s->ky = s->kx == 2 ? 0 : s->kx + 1;
+    float scale = 1.0f / ray->direction[s->kz];
+    s->sx = vf_set1(ray->direction[s->kx] * scale);
+    s->sy = vf_set1(ray->direction[s->ky] * scale);
+    s->sz = vf_set1(scale);
 }
 
 /* The edge functions where they are zero, again: products of two floats are exact in double. */
@@ -103,66 +111,88 @@ VINL uint32_t meet_node(const es_bvh_node* node, const ray_setup* s, vf low, flo
     return vm_bits(vm_le(begin, end));
 }
 
+/* Pushes the children in `bits`, the nearest on top, which it returns popped. */
+VINL entry push(const uint32_t* child, uint32_t bits, vf distance, entry* stack, uint32_t* size)
+{
+    float distances[VW];
+    vf_store(distances, distance);
+    uint32_t first = (uint32_t)__builtin_ctz(bits);
+    entry near = {child[first], distances[first]};
+    bits &= bits - 1;
+    if (!bits) return near;
+    uint32_t second = (uint32_t)__builtin_ctz(bits), base = *size, top = base;
+    bits &= bits - 1;
+    entry other = {child[second], distances[second]};
+    bool swap = other.distance < near.distance;
+    stack[top++] = swap ? near : other;
+    near = swap ? other : near;
+    if (!bits) {
+        *size = top;
+        return near;
+    }
+    stack[top++] = near;
+    /* few, so they are sorted by insertion */
+    while (bits) {
+        uint32_t i = (uint32_t)__builtin_ctz(bits), place = top++;
+        bits &= bits - 1;
+        entry e = {child[i], distances[i]};
+        for (; place > base && stack[place - 1].distance < e.distance; place--) stack[place] = stack[place - 1];
+        stack[place] = e;
+    }
+    *size = top - 1;
+    return stack[top - 1];
+}
+
+/* The nearest of the block's hits, if it is nearer than what there is; the block's box begins at `begin`. */
+VINL void take_nearest(const es_bvh_block* block, const ray_setup* s, vf low, float begin, float* nearest, es_hit* hit)
+{
+    vf t = vf_zero(), v = vf_zero(), w = vf_zero();
+    uint32_t bits = vm_bits(meet_block(block, s, low, vf_set1(*nearest), &t, &v, &w));
+    if (!bits) return;
+    vf key = vf_max(t, vf_set1(begin * NEAR_MARGIN));
+    for (; bits; bits &= bits - 1) {
+        uint32_t i = (uint32_t)__builtin_ctz(bits);
+        /* the ray's own end is excluded, a hit at the nearest so far is not */
+        if (key[i] < *nearest || (key[i] == *nearest && hit->primitive != ES_NO_PRIMITIVE && block->primitive[i] < hit->primitive)) {
+            *nearest = key[i];
+            *hit = (es_hit){t[i], v[i], w[i], block->primitive[i]};
+        }
+    }
+}
+
 static void closest(const es_bvh* bvh, const es_ray* ray, es_hit* hit)
 {
     *hit = (es_hit){ray->max, 0.0f, 0.0f, ES_NO_PRIMITIVE};
-    const ray_setup s = prepare(ray);
+    ray_setup s;
+    prepare(ray, &s);
     const vf low = vf_set1(ray->min);
-    /* the ray's own end is excluded, a hit at the nearest so far is not */
-    entry stack[ES_BVH_STACK];
-    uint32_t size = 0, at = 0;
+    entry stack[ES_BVH_STACK], at = {0, ray->min};
+    uint32_t size = 0;
     float nearest = ray->max;
     for (;;) {
-        if (!(at & ES_BVH_BLOCK)) {
-            float distances[VW];
-            vf distance;
-            uint32_t bits = meet_node(&bvh->nodes[at], &s, low, nearest, &distance);
-            if (bits) {
-                const uint32_t* child = bvh->nodes[at].child;
-                uint32_t first = (uint32_t)__builtin_ctz(bits);
-                bits &= bits - 1;
-                if (!bits) {
-                    at = child[first];
-                    continue;
-                }
-                /* all go on the stack, the nearest on top: few, so they are sorted by insertion */
-                vf_store(distances, distance);
-                uint32_t base = size;
-                stack[size++] = (entry){child[first], distances[first]};
-                while (bits) {
-                    uint32_t i = (uint32_t)__builtin_ctz(bits), place = size++;
-                    bits &= bits - 1;
-                    entry e = {child[i], distances[i]};
-                    for (; place > base && stack[place - 1].distance < e.distance; place--) stack[place] = stack[place - 1];
-                    stack[place] = e;
-                }
-                at = stack[--size].child;
-                continue;
-            }
+        if (at.child & ES_BVH_BLOCK) {
+            take_nearest(&bvh->blocks[at.child & ~ES_BVH_BLOCK], &s, low, at.distance, &nearest, hit);
         } else {
-            const es_bvh_block* block = &bvh->blocks[at & ~ES_BVH_BLOCK];
-            vf t = vf_zero(), v = vf_zero(), w = vf_zero();
-            uint32_t bits = vm_bits(meet_block(block, &s, low, vf_set1(nearest), &t, &v, &w));
-            while (bits) {
-                uint32_t i = (uint32_t)__builtin_ctz(bits);
-                bits &= bits - 1;
-                if (t[i] < nearest || (t[i] == nearest && hit->primitive != ES_NO_PRIMITIVE && block->primitive[i] < hit->primitive)) {
-                    nearest = t[i];
-                    *hit = (es_hit){t[i], v[i], w[i], block->primitive[i]};
-                }
+            const es_bvh_node* node = &bvh->nodes[at.child];
+            vf distance;
+            uint32_t bits = meet_node(node, &s, low, nearest, &distance);
+            if (bits) {
+                at = push(node->child, bits, distance, stack, &size);
+                continue;
             }
         }
         do {
             if (!size) return;
             size--;
         } while (stack[size].distance > nearest * FAR_MARGIN);
-        at = stack[size].child;
+        at = stack[size];
     }
 }
 
 static bool any(const es_bvh* bvh, const es_ray* ray)
 {
-    const ray_setup s = prepare(ray);
+    ray_setup s;
+    prepare(ray, &s);
     const vf low = vf_set1(ray->min), high = vf_set1(ray->max);
     uint32_t stack[ES_BVH_STACK], size = 0, at = 0;
     for (;;) {
@@ -181,12 +211,175 @@ static bool any(const es_bvh* bvh, const es_ray* ray)
     }
 }
 
+/* ---- eight rays of one octant ----------------------------------------------------------------------------------------------------- */
+
+typedef struct ray_packet {
+    ray_setup rays[VW];
+    vf origin[3], far_origin[3], inverse[3], low; /* a ray per lane */
+    ray_setup all;                                /* origins of the intervals' ends that meet the planes first, last */
+    vf inverse_low[3], inverse_high[3];           /* the same in all lanes */
+    float lowest;
+} ray_packet;
+
+static float least(vf a)
+{
+    float m = a[0];
+    for (int i = 1; i < VW; i++) m = a[i] < m ? a[i] : m;
+    return m;
+}
+static float most(vf a)
+{
+    float m = a[0];
+    for (int i = 1; i < VW; i++) m = a[i] > m ? a[i] : m;
+    return m;
+}
+
+/* False when the rays are not of one octant, or some are not finite. */
+static bool gather(ray_packet* p, const es_ray* rays)
+{
+    for (int i = 0; i < VW; i++) prepare(&rays[i], &p->rays[i]);
+    for (int i = 0; i < VW; i++) {
+        const ray_setup* s = &p->rays[i];
+        for (int k = 0; k < 3; k++) {
+            if (s->near_plane[k] != p->rays[0].near_plane[k]) return false;
+            float finite = rays[i].origin[k] + rays[i].direction[k];
+            if (!(finite - finite == 0.0f)) return false;
+            p->origin[k][i] = s->origin[k][0];
+            p->far_origin[k][i] = s->far_origin[k][0];
+            p->inverse[k][i] = s->inverse[k][0];
+        }
+        p->low[i] = rays[i].min;
+    }
+    for (int k = 0; k < 3; k++) {
+        int near = p->rays[0].near_plane[k];
+        bool negative = near != k;
+        p->all.near_plane[k] = near;
+        p->all.far_plane[k] = p->rays[0].far_plane[k];
+        p->all.origin[k] = vf_set1(negative ? least(p->origin[k]) : most(p->origin[k]));
+        p->all.far_origin[k] = vf_set1(negative ? most(p->far_origin[k]) : least(p->far_origin[k]));
+        p->inverse_low[k] = vf_set1(least(p->inverse[k]));
+        p->inverse_high[k] = vf_set1(most(p->inverse[k]));
+    }
+    p->lowest = least(p->low);
+    return true;
+}
+
+/* Children that some ray may meet; distances before which none does. */
+VINL uint32_t meet_node_together(const es_bvh_node* node, const ray_packet* p, float farthest, vf* distance)
+{
+    vf begin = vf_set1(p->lowest), end = vf_set1(farthest);
+    for (int k = 0; k < 3; k++) {
+        vf near = vf_load(node->plane[p->all.near_plane[k]]) - p->all.origin[k], far = vf_load(node->plane[p->all.far_plane[k]]) - p->all.far_origin[k];
+        begin = vf_max(begin, vf_min(near * p->inverse_low[k], near * p->inverse_high[k]));
+        end = vf_min(end, vf_max(far * p->inverse_low[k], far * p->inverse_high[k]));
+    }
+    *distance = begin;
+    return vm_bits(vm_le(begin, end * vf_set1(FAR_MARGIN)));
+}
+
+/* Rays that meet the block's box before `nearest`, each as it would alone. */
+VINL uint32_t meet_box(const es_bvh_box* box, const ray_packet* p, vf nearest, vf* distance)
+{
+    vf near[3], far[3];
+    for (int k = 0; k < 3; k++) {
+        bool negative = p->all.near_plane[k] != k;
+        near[k] = (vf_set1(negative ? box->max[k] : box->min[k]) - p->origin[k]) * p->inverse[k];
+        far[k] = (vf_set1(negative ? box->min[k] : box->max[k]) - p->far_origin[k]) * p->inverse[k];
+    }
+    vf begin = vf_max(vf_max(near[0], near[1]), vf_max(near[2], p->low));
+    vf end = vf_min(vf_min(far[0], far[1]), vf_min(far[2], nearest)) * vf_set1(FAR_MARGIN);
+    *distance = begin;
+    return vm_bits(vm_le(begin, end));
+}
+
+static void closest_together(const es_bvh* bvh, const es_ray* rays, es_hit* hits)
+{
+    ray_packet p;
+    if (!gather(&p, rays)) {
+        for (int i = 0; i < VW; i++) closest(bvh, &rays[i], &hits[i]);
+        return;
+    }
+    float nearest[VW], farthest = rays[0].max;
+    for (int i = 0; i < VW; i++) {
+        hits[i] = (es_hit){rays[i].max, 0.0f, 0.0f, ES_NO_PRIMITIVE};
+        nearest[i] = rays[i].max;
+        farthest = nearest[i] > farthest ? nearest[i] : farthest;
+    }
+    entry stack[ES_BVH_STACK], at = {0, p.lowest};
+    uint32_t size = 0;
+    for (;;) {
+        if (at.child & ES_BVH_BLOCK) {
+            uint32_t block = at.child & ~ES_BVH_BLOCK;
+            vf begin;
+            uint32_t bits = meet_box(&bvh->boxes[block], &p, vf_load(nearest), &begin);
+            if (bits) {
+                for (; bits; bits &= bits - 1) {
+                    int i = __builtin_ctz(bits);
+                    take_nearest(&bvh->blocks[block], &p.rays[i], vf_set1(rays[i].min), begin[i], &nearest[i], &hits[i]);
+                }
+                farthest = most(vf_load(nearest));
+            }
+        } else {
+            const es_bvh_node* node = &bvh->nodes[at.child];
+            vf distance;
+            uint32_t bits = meet_node_together(node, &p, farthest, &distance);
+            if (bits) {
+                at = push(node->child, bits, distance, stack, &size);
+                continue;
+            }
+        }
+        do {
+            if (!size) return;
+            size--;
+        } while (stack[size].distance > farthest * FAR_MARGIN);
+        at = stack[size];
+    }
+}
+
+static void any_together(const es_bvh* bvh, const es_ray* rays, uint8_t* blocked)
+{
+    ray_packet p;
+    if (!gather(&p, rays)) {
+        for (int i = 0; i < VW; i++) blocked[i] = any(bvh, &rays[i]);
+        return;
+    }
+    vf nearest;
+    for (int i = 0; i < VW; i++) nearest[i] = rays[i].max;
+    float farthest = most(nearest);
+    uint32_t stack[ES_BVH_STACK], size = 0, at = 0, open = 0xffu;
+    for (;;) {
+        if (at & ES_BVH_BLOCK) {
+            uint32_t block = at & ~ES_BVH_BLOCK;
+            vf begin;
+            uint32_t bits = meet_box(&bvh->boxes[block], &p, nearest, &begin) & open;
+            for (; bits; bits &= bits - 1) {
+                int i = __builtin_ctz(bits);
+                vf t = vf_zero(), v = vf_zero(), w = vf_zero(), high = vf_set1(rays[i].max);
+                vm hit = meet_block(&bvh->blocks[block], &p.rays[i], vf_set1(rays[i].min), high, &t, &v, &w);
+                if (vm_any(hit & vm_lt(t, high))) open &= ~(1u << i);
+            }
+        } else {
+            vf distance;
+            uint32_t bits = meet_node_together(&bvh->nodes[at], &p, farthest, &distance);
+            const uint32_t* child = bvh->nodes[at].child;
+            for (; bits; bits &= bits - 1) stack[size++] = child[__builtin_ctz(bits)];
+        }
+        if (!size || !open) break;
+        at = stack[--size];
+    }
+    for (int i = 0; i < VW; i++) blocked[i] = !(open >> i & 1);
+}
+
 void ES_KERNEL(es_gi_trace_closest)(const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits)
 {
-    for (uint32_t i = 0; i < count; i++) closest(bvh, &rays[i], &hits[i]);
+    uint32_t i = 0;
+    for (; coherent && i + VW <= count; i += VW) closest_together(bvh, rays + i, hits + i);
+    for (; i < count; i++) closest(bvh, &rays[i], &hits[i]);
 }
 
 void ES_KERNEL(es_gi_trace_any)(const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked)
 {
-    for (uint32_t i = 0; i < count; i++) blocked[i] = any(bvh, &rays[i]);
+    uint32_t i = 0;
+    for (; coherent && i + VW <= count; i += VW) any_together(bvh, rays + i, blocked + i);
+    for (; i < count; i++) blocked[i] = any(bvh, &rays[i]);
 }
