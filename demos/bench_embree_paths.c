@@ -2,7 +2,7 @@
  * through the 8 × 8 geometry-aware box of the peer. Built and run by `earthshine bench error`, with the folder of the peer's program on
  * the include path.
  *
- * usage: FOLDER SAMPLES SECONDS THREADS   Doubles the samples until there are SAMPLES or SECONDS have passed. Writes FOLDER/raw-N and
+ * usage: FOLDER SAMPLES SECONDS THREADS   Doubles the samples until there are SAMPLES or, beyond 4, SECONDS have passed. Writes FOLDER/raw-N and
  *                                         FOLDER/box-N, float RGB radiance, 1024 × 768, top row first; prints the rows "N time" and
  *                                         "N box time", which leave out "primary time", the hits that all of them begin from. */
 #define main peer_main
@@ -46,7 +46,7 @@ int main(int count, char** arguments)
     }
     row("primary time", median(primary, 5), "s");
     float *sums = calloc(W * H, 12), *filtered = malloc(W * H * 12);
-    for (int done = 0, wanted = 1; wanted <= most && seconds < limit; wanted *= 2) {
+    for (int done = 0, wanted = 1; wanted <= most && (seconds < limit || wanted <= 4); wanted *= 2) {
         double start = now_s();
         PT tracer = {sums, done, wanted, 0x1111u, 1};
         par(t_pt, &tracer, TX * TY);

@@ -230,7 +230,7 @@ static int write_report(const run* r, error_scene* scenes, size_t count)
     }
     demo_text_add(&report.members, "\n]");
     for (size_t i = 0; i < all_count; i++)
-        if (bench_wants(r->options, all[i].id)) rows[row_count++] = all[i];
+        if (bench_wants(r->options, all[i].id) && (all[i].judge != BENCH_NONE || !isnan(all[i].value))) rows[row_count++] = all[i];
     bench_print(rows, row_count);
     return bench_report_write(&report, r->options, rows, row_count, r->context);
 }

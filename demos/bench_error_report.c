@@ -6,7 +6,7 @@
 
 #define EMBREE "Embree 3, one bounce, two threads"
 static const double frame_budget = 50; /* ms */
-enum { SETTING_NAME_SIZE = 128 };
+enum { SETTING_NAME_SIZE = 128, LEAST_SAMPLES = 8 };
 
 static const bench_row table[] = {
     {"reference-room-0.05", "path tracer to relRMSE 0.05 of the room's indirect light", "s", EMBREE, BENCH_RATIO_AT_LEAST, 1 / 1.5, 2},
@@ -71,7 +71,8 @@ static void fill_tracer_row(const error_scene* scene, bench_row* row)
 static void fill_agreement_row(const error_scene* scene, bench_row* row)
 {
     const error_agreement* a = &scene->agreement;
-    if (!a->blocks) return;
+    if (a->blocks && a->samples < LEAST_SAMPLES) snprintf(row->note, sizeof row->note, "%u samples a pixel are too few to know their noise", (unsigned)a->samples);
+    if (!a->blocks || a->samples < LEAST_SAMPLES) return;
     row->value = 100.0 * (double)a->within / (double)a->blocks;
     snprintf(row->note, sizeof row->note, "%zu of %zu blocks; the worst is %.2f standard errors off; ours has %u samples a pixel; by chance alone 99.73 %% would agree", a->within,
         a->blocks, a->worst, (unsigned)a->samples);
@@ -191,13 +192,13 @@ static void least_headline(const error_scene* scene, measure which, char text[PL
     if (!least) return;
     describe(least, name);
     plot_format_value(time, least->milliseconds);
-    const char* what = which == FLICKER ? "steadiest setting" : "setting nearest to the eye's truth";
+    const char *what = which == FLICKER ? "the steadiest setting" : "the setting that looks most like the truth", *unit = which == FLICKER ? "flicker" : "FLIP";
     if (fast && fast != least) {
         describe(fast, fast_name);
-        snprintf(text, PLOT_HEADLINE_SIZE, "%.80s: the %s within 50 ms is %s with %.3f; without that limit %s with %.3f in %s ms", scene->name, what, fast_name,
+        snprintf(text, PLOT_HEADLINE_SIZE, "%.80s: within 50 ms %s is %s, %s %.3f; without that limit %s, %.3f in %s ms", scene->name, what, fast_name, unit,
             measure_of(&fast->error, fast->flicker, which), name, measure_of(&least->error, least->flicker, which), time);
     } else {
-        snprintf(text, PLOT_HEADLINE_SIZE, "%.80s: the %s is %s with %.3f in %s ms", scene->name, what, name, measure_of(&least->error, least->flicker, which), time);
+        snprintf(text, PLOT_HEADLINE_SIZE, "%.80s: %s is %s, %s %.3f in %s ms", scene->name, what, name, unit, measure_of(&least->error, least->flicker, which), time);
     }
 }
 
@@ -261,7 +262,7 @@ static void add_tracer_plot(bench_report* report, const error_scene* scene)
 static void add_agreement_plot(bench_report* report, const error_scene* scene)
 {
     const error_agreement* a = &scene->agreement;
-    if (!a->blocks || !a->deviations) return;
+    if (!a->blocks || !a->deviations || a->samples < LEAST_SAMPLES) return;
     plot_curves plot = {.id = "agreement", .x_name = "standard errors between the two references' means of a block", .y_name = "share of blocks further apart, %", .y_log = true};
     plot_series* measured = plot_add_series(&plot, 0, "measured");
     measured->line = true;

@@ -189,8 +189,8 @@ static void headline(axis_id id, const axis_costs* costs, const plot_curves* plo
         if (!steepest || plot_log_slope(&plot->series[s]) > plot_log_slope(steepest)) steepest = &plot->series[s];
     }
     char from[32], to[32], cheap[32], dear[32];
-    plot_format_tick(from, costs->x[0]);
-    plot_format_tick(to, costs->x[last]);
+    plot_format_value(from, costs->x[0]);
+    plot_format_value(to, costs->x[last]);
     plot_format_value(cheap, costs->costs[0].total);
     plot_format_value(dear, costs->costs[last].total);
     int length = snprintf(text, PLOT_HEADLINE_SIZE, "From %s to %s %s a frame goes from %s to %s ms: it grows as their number to the power of %.2f", from, to, axes[id].thing, cheap, dear,
