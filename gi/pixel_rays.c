@@ -9,7 +9,11 @@ es_pixel_rays es_pixel_rays_of_view(const es_raster_view* view)
 {
     const float* v = view->view.m;
     const float* p = view->projection.m;
-    es_pixel_rays rays = {.orthographic = p[15] == 1.0f};
+    es_pixel_rays rays = {.orthographic = p[15] == 1.0f, .near_depth = p[14], .far_depth = 3e38f};
+    if (rays.orthographic) { /* depth 1 and 0 of the reversed range */
+        rays.near_depth = es_maxf((p[14] - 1.0f) / p[10], 0.0f);
+        rays.far_depth = p[14] / p[10];
+    }
     float step_x = 2.0f / (float)view->width, step_y = -2.0f / (float)view->height;
     float first_x = 0.5f * step_x - 1.0f, first_y = 1.0f + 0.5f * step_y;
     for (int k = 0; k < 3; k++) {

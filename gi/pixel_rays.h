@@ -9,6 +9,7 @@
 typedef struct es_pixel_rays {
     float base[3], base_dx[3], base_dy[3];
     float dir[3], dir_dx[3], dir_dy[3];
+    float near_depth, far_depth;   /* of what the view shows; perspective: to 3e38 */
     bool orthographic;
 } es_pixel_rays;
 

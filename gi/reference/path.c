@@ -124,7 +124,7 @@ static es_vec3 lift_to_horizon(es_vec3 n, es_vec3 wo)
 void es_path_begin(const es_trace_scene* scene, const es_pixel_rays* rays, float x, float y, bool quantised, es_path_start* start)
 {
     es_vec3 d = es_pixel_rays_direction(rays, x, y), o = es_pixel_rays_position(rays, x, y, 0.0f);
-    es_ray ray = {{o.x, o.y, o.z}, 0.0f, {d.x, d.y, d.z}, 3e38f};
+    es_ray ray = {{o.x, o.y, o.z}, rays->near_depth, {d.x, d.y, d.z}, rays->far_depth};
     es_hit hit;
     *start = (es_path_start){0};
     es_vec3 wo = es_v3_normalize(es_v3_scale(d, -1.0f), es_v3(0, 0, 1));
