@@ -115,33 +115,55 @@ es_result es_context_last_result(const es_context* context) { return context ? c
 
 /* ---- memory --------------------------------------------------------------------------------------------------------- */
 
-void* es_allocate(es_context* context, size_t size)
+/* Adds to the count unless the cap stands against it; *in_use: what was before. */
+static bool count_in(es_context* context, size_t size, size_t* in_use)
 {
-    if (size == 0) size = 1;
     /* compare-and-swap rather than add and undo: an attempt that fails must not make another thread's fail */
     size_t before = atomic_load_explicit(&context->bytes, memory_order_relaxed);
     do {
         if (size > context->desc.memory_cap || before > context->desc.memory_cap - size) {
             es_fail(context, ES_MEMORY_CAP, "%zu bytes asked for with %zu in use; the memory cap is %zu bytes", size, before,
                 context->desc.memory_cap);
-            return NULL;
+            return false;
         }
     } while (!atomic_compare_exchange_weak_explicit(
         &context->bytes, &before, before + size, memory_order_relaxed, memory_order_relaxed));
+    *in_use = before;
+    return true;
+}
 
+static void raise_peak(es_context* context, size_t now)
+{
+    size_t peak = atomic_load_explicit(&context->peak_bytes, memory_order_relaxed);
+    while (now > peak &&
+           !atomic_compare_exchange_weak_explicit(&context->peak_bytes, &peak, now, memory_order_relaxed, memory_order_relaxed)) {
+    }
+}
+
+void* es_allocate(es_context* context, size_t size)
+{
+    size_t before;
+    if (size == 0) size = 1;
+    if (!count_in(context, size, &before)) return NULL;
     void* pointer = context->desc.allocator.allocate(context->desc.allocator.user, size, 64);
     if (!pointer) {
         atomic_fetch_sub_explicit(&context->bytes, size, memory_order_relaxed);
         es_fail(context, ES_OUT_OF_MEMORY, "the allocator returned nothing for %zu bytes, with %zu in use", size, before);
         return NULL;
     }
-    size_t now = before + size;
-    size_t peak = atomic_load_explicit(&context->peak_bytes, memory_order_relaxed);
-    while (now > peak &&
-           !atomic_compare_exchange_weak_explicit(&context->peak_bytes, &peak, now, memory_order_relaxed, memory_order_relaxed)) {
-    }
+    raise_peak(context, before + size);
     return pointer;
 }
+
+bool es_reserve(es_context* context, size_t size)
+{
+    size_t before;
+    if (!count_in(context, size, &before)) return false;
+    raise_peak(context, before + size);
+    return true;
+}
+
+void es_unreserve(es_context* context, size_t size) { atomic_fetch_sub_explicit(&context->bytes, size, memory_order_relaxed); }
 
 void* es_allocate_zero(es_context* context, size_t size)
 {

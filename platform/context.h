@@ -13,6 +13,11 @@ void es_release(es_context* context, void* pointer, size_t size);  /* NULL allow
 /* count * size without overflow (fails with OUT_OF_MEMORY) */
 void* es_allocate_array(es_context* context, size_t count, size_t size);
 
+/* Counts what a library is about to allocate by itself, past the allocator, as if it came from it: false after es_fail(MEMORY_CAP). It is
+ * given back with es_unreserve. */
+bool es_reserve(es_context* context, size_t size);
+void es_unreserve(es_context* context, size_t size);
+
 /* Grows *pointer so that it holds `needed` elements, keeping the first `used`; *capacity is updated. False on failure,
  * with the old block untouched. New memory is undefined. */
 bool es_grow(es_context* context, void** pointer, size_t* capacity, size_t used, size_t needed, size_t element_size);

@@ -122,7 +122,8 @@ ES_API es_context_desc es_context_resolved_desc(const es_context* context);
 /* Last failure on this context, one line, never NULL; "" before the first. Valid until the next failure. */
 ES_API const char* es_context_message(const es_context* context);
 ES_API es_result es_context_last_result(const es_context* context);
-/* Bytes allocated through the context now, and the most there ever were. */
+/* Bytes allocated through the context now, and the most there ever were. What a library allocates by itself to import a glTF file counts
+ * too, by an upper estimate, as long as the import lasts. */
 ES_API size_t es_context_bytes(const es_context* context);
 ES_API size_t es_context_peak_bytes(const es_context* context);
 ES_API es_isa es_context_isa(const es_context* context);

@@ -56,6 +56,7 @@ typedef struct es_gltf_document {
     size_t buffer_count, buffer_capacity, image_count, image_capacity;
     es_gltf_primitive* primitives; /* in the order of the file */
     size_t primitive_count, primitive_capacity;
+    size_t value_count, object_count, material_count; /* of the text: all values, objects outside of extras and extensions, materials */
 } es_gltf_document;
 
 /* Refuses what is not JSON, is nested too deeply, is no glTF 2.0, requires an extension that is not supported, or has

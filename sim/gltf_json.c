@@ -491,6 +491,15 @@ static bool read_word(parser* p)
     return syntax(p, "a value is expected");
 }
 
+/* What the structures made of the text will take depends on these. */
+static void count_value(parser* p, char first)
+{
+    p->document->value_count++;
+    if (first != '{' || p->ignored) { return; }
+    p->document->object_count++;
+    if (p->depth == 2 && !p->stack[1].object && is(p->stack[0].key, "materials")) { p->document->material_count++; }
+}
+
 static bool parse(parser* p)
 {
     enum { BEFORE_VALUE, AFTER_VALUE } state = BEFORE_VALUE;
@@ -503,6 +512,7 @@ static bool parse(parser* p)
             span text = {p->at, 0};
             bool escaped = false;
             state = AFTER_VALUE;
+            count_value(p, c);
             if (c == '{' || c == '[') {
                 if (!found(p, c == '{' ? VALUE_OBJECT : VALUE_ARRAY, text, false)) { return false; }
                 if (p->depth == MAX_DEPTH) { return syntax(p, "is nested deeper than 128 levels"); }

@@ -876,6 +876,17 @@ static void the_memory_cap_holds(void** state)
     }
     fixture.context = normal;
     assert_true(refused > 0 && accepted > 0);
+    /* 60 kB that become structures of some 80 MB: they are counted before they are made */
+    enum { MATERIALS = 20000 };
+    char* many = malloc(3 * MATERIALS + 100);
+    int used = sprintf(many, "{\"asset\":{\"version\":\"2.0\"},\"materials\":[{}");
+    for (int i = 1; i < MATERIALS; i++) { used += sprintf(many + used, ",{}"); }
+    used += sprintf(many + used, "]}");
+    write_file("many.gltf", many, (size_t)used);
+    free(many);
+    fixture.context = new_context(16u << 20);
+    assert_int_equal(import("many.gltf", NULL, &world), ES_MEMORY_CAP);
+    es_context_destroy(fixture.context);
     /* a file larger than the cap is not even read */
     char* large = malloc(1 << 20);
     memset(large, ' ', 1 << 20);

@@ -2,8 +2,9 @@
  * nothing to ample, and on a full disk.
  *
  * Whatever fails says so once, with the right result, leaves no file behind and none changed, gives everything back, and when it is tried
- * again with enough it gives the same bits as if nothing had been. What third parties allocate by themselves (tinygltf's structures and
- * OpenEXRCore's contexts, bounded by the file's size) does not go through a context and cannot be made to fail here. */
+ * again with enough it gives the same bits as if nothing had been. What third parties allocate by themselves does not go through a context
+ * and cannot be made to fail here: tinygltf's structures, which are counted by an estimate, and OpenEXRCore's headers and buffers of one
+ * chunk. */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -842,7 +843,8 @@ static bool run_capped(const operation* o, size_t cap, uint64_t expected)
         HOLDS(o->hash(&w, o, object) == expected, o, "under a cap of %zu bytes the result is another one", cap);
     }
     HOLDS(memory.most <= cap, o, "%zu bytes were held under a cap of %zu", memory.most, cap);
-    HOLDS(es_context_peak_bytes(w.context) == memory.most, o, "the peak is %zu, not %zu", memory.most, es_context_peak_bytes(w.context));
+    HOLDS(es_context_peak_bytes(w.context) >= memory.most && es_context_peak_bytes(w.context) <= cap, o, "the peak of %zu bytes is said to be %zu, the cap is %zu", memory.most,
+        es_context_peak_bytes(w.context), cap);
     clean_up(&w, o, object);
     end_context(w.context);
     return result == ES_OK;
@@ -856,7 +858,7 @@ static void caps_hold(void** state)
         uint64_t hash;
         long allocations;
         bool built = run_fresh(&w, o, &hash, &allocations);
-        size_t most = memory.most;
+        size_t most = es_context_peak_bytes(w.context); /* with what libraries allocate by themselves */
         end_context(w.context);
         if (!built) continue;
         int refused = 0;

@@ -80,7 +80,8 @@ void fuzz_end(fuzz_run* run)
     FUZZ_CHECK(run->messages == 0, "a message that no result came with: %s", es_context_message(run->context));
     FUZZ_CHECK(es_context_bytes(run->context) == 0 && run->live == 0, "%zu bytes are not given back, by the allocator's count %zu",
         es_context_bytes(run->context), run->live);
-    FUZZ_CHECK(run->most <= run->cap && es_context_peak_bytes(run->context) == run->most, "the most was %zu bytes, by the context's count %zu, the cap is %zu",
+    /* the context also counts what libraries allocate by themselves */
+    FUZZ_CHECK(run->most <= es_context_peak_bytes(run->context) && es_context_peak_bytes(run->context) <= run->cap, "the most was %zu bytes, by the context's count %zu, the cap is %zu",
         run->most, es_context_peak_bytes(run->context), run->cap);
     run->live = 1 << 20; /* room for the context's own block, which goes through the same function */
     es_context_destroy(run->context);
