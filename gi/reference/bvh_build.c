@@ -11,10 +11,17 @@
 
 enum { BINS = 16, LEAF = ES_BVH_WIDTH, MAX_DEPTH = 64, CHUNKS = 16 };
 
-typedef struct item { float min[3]; uint32_t primitive; float max[3]; uint32_t unused; } item;
+typedef struct item { float min[4], max[4]; } item; /* [3]: the bits of the primitive; nothing */
 
-/* a binary node; count 0: inner */
-typedef struct split_node { es_bvh_box box; uint32_t first, count, left, right; } split_node;
+static uint32_t primitive_of(const item* i)
+{
+    uint32_t p;
+    memcpy(&p, &i->min[3], sizeof p);
+    return p;
+}
+
+/* A binary node of `count` triangles from `first`; count 0: inner, its left child comes next and `first` is the right one. */
+typedef struct split_node { es_bvh_box box; uint32_t first, count; } split_node;
 
 typedef struct task { uint32_t node, begin, end, depth; } task;
 
@@ -44,7 +51,24 @@ static float middle(const item* i, int axis) { return 0.5f * i->min[axis] + 0.5f
 /* ---- bounds and bins of a range --------------------------------------------------------------------------------------------- */
 
 typedef struct extent { es_bvh_box box, middles; } extent;
-typedef struct bins { es_bvh_box box[3][BINS]; uint32_t count[3][BINS]; } bins;
+/* Four numbers at a time, of which the last, an item's primitive, is along for the ride: whole vectors instead of three scalars. */
+typedef float four __attribute__((vector_size(16)));
+typedef int32_t four_bits __attribute__((vector_size(16)));
+typedef struct wide_box { four min, max; } wide_box;
+typedef struct bins { wide_box box[3][BINS]; uint32_t count[3][BINS]; } bins;
+
+static wide_box no_wide_box(void) { return (wide_box){{1e30f, 1e30f, 1e30f, 1e30f}, {-1e30f, -1e30f, -1e30f, -1e30f}}; }
+static inline four choose(four_bits m, four yes, four no) { return (four)((m & (four_bits)yes) | (~m & (four_bits)no)); }
+static inline void grow_wide(wide_box* box, four low, four high)
+{
+    box->min = choose(low < box->min, low, box->min);
+    box->max = choose(high > box->max, high, box->max);
+}
+static float half_wide_area(const wide_box* b)
+{
+    float x = b->max[0] - b->min[0], y = b->max[1] - b->min[1], z = b->max[2] - b->min[2];
+    return x >= 0.0f ? x * y + y * z + z * x : 0.0f;
+}
 
 static void measure(const item* items, uint32_t begin, uint32_t end, extent* e)
 {
@@ -56,15 +80,16 @@ static void measure(const item* items, uint32_t begin, uint32_t end, extent* e)
     }
 }
 
-typedef struct axis_scale { float low[3], scale[3]; } axis_scale;
+/* Few triangles need few bins: as many are kept clean and searched as are worth it. */
+typedef struct axis_scale { float low[3], scale[3]; int bins; } axis_scale;
 
-static axis_scale scale_of(const extent* e)
+static axis_scale scale_of(const extent* e, uint32_t count)
 {
-    axis_scale s;
+    axis_scale s = {.bins = count > 64 ? BINS : BINS / 2};
     for (int k = 0; k < 3; k++) {
         float width = e->middles.max[k] - e->middles.min[k];
         s.low[k] = e->middles.min[k];
-        s.scale[k] = width > 1e-30f ? (BINS * 0.99999f) / width : 0.0f;
+        s.scale[k] = width > 1e-30f ? ((float)s.bins * 0.99999f) / width : 0.0f;
     }
     return s;
 }
@@ -75,13 +100,17 @@ static void fill_bins(const item* items, uint32_t begin, uint32_t end, const axi
 {
     memset(b->count, 0, sizeof b->count);
     for (int k = 0; k < 3; k++)
-        for (int n = 0; n < BINS; n++) b->box[k][n] = no_box();
-    for (uint32_t i = begin; i < end; i++)
+        for (int n = 0; n < s->bins; n++) b->box[k][n] = no_wide_box();
+    for (uint32_t i = begin; i < end; i++) {
+        four low, high;
+        memcpy(&low, items[i].min, sizeof low);
+        memcpy(&high, items[i].max, sizeof high);
         for (int k = 0; k < 3; k++) {
             uint32_t n = bin_of(&items[i], s, k);
-            grow(&b->box[k][n], items[i].min, items[i].max);
+            grow_wide(&b->box[k][n], low, high);
             b->count[k][n]++;
         }
+    }
 }
 
 typedef struct chunk_job { const builder* b; uint32_t begin, end; const axis_scale* scale; extent* extents; bins* all; } chunk_job;
@@ -119,8 +148,8 @@ static void fill_bins_wide(builder* b, uint32_t begin, uint32_t end, const axis_
     *out = parts[0];
     for (int c = 1; c < CHUNKS; c++)
         for (int k = 0; k < 3; k++)
-            for (int n = 0; n < BINS; n++) {
-                grow(&out->box[k][n], parts[c].box[k][n].min, parts[c].box[k][n].max);
+            for (int n = 0; n < s->bins; n++) {
+                grow_wide(&out->box[k][n], parts[c].box[k][n].min, parts[c].box[k][n].max);
                 out->count[k][n] += parts[c].count[k][n];
             }
 }
@@ -128,26 +157,26 @@ static void fill_bins_wide(builder* b, uint32_t begin, uint32_t end, const axis_
 /* ---- splitting ----------------------------------------------------------------------------------------------------------------- */
 
 /* The cheapest plane by area × count; false when all middles coincide. */
-static bool best_plane(const bins* b, int* best_axis, uint32_t* best_bin, float* best_cost)
+static bool best_plane(const bins* b, int used, int* best_axis, uint32_t* best_bin, float* best_cost)
 {
     *best_cost = 3e38f;
     bool found = false;
     for (int k = 0; k < 3; k++) {
         float right_cost[BINS];
-        es_bvh_box box = no_box();
+        wide_box box = no_wide_box();
         uint32_t count = 0;
-        for (int n = BINS - 1; n > 0; n--) {
-            grow(&box, b->box[k][n].min, b->box[k][n].max);
+        for (int n = used - 1; n > 0; n--) {
+            grow_wide(&box, b->box[k][n].min, b->box[k][n].max);
             count += b->count[k][n];
-            right_cost[n] = count ? half_area(&box) * (float)count : -1.0f;
+            right_cost[n] = count ? half_wide_area(&box) * (float)count : -1.0f;
         }
-        box = no_box();
+        box = no_wide_box();
         count = 0;
-        for (int n = 1; n < BINS; n++) {
-            grow(&box, b->box[k][n - 1].min, b->box[k][n - 1].max);
+        for (int n = 1; n < used; n++) {
+            grow_wide(&box, b->box[k][n - 1].min, b->box[k][n - 1].max);
             count += b->count[k][n - 1];
             if (!count || right_cost[n] < 0.0f) continue;
-            float cost = half_area(&box) * (float)count + right_cost[n];
+            float cost = half_wide_area(&box) * (float)count + right_cost[n];
             if (cost < *best_cost) {
                 *best_cost = cost;
                 *best_axis = k;
@@ -175,8 +204,11 @@ static uint32_t partition(item* items, uint32_t begin, uint32_t end, const axis_
     return i;
 }
 
+/* A subtree of n triangles has at most 2 n - 1 nodes: its root, then its left subtree's places, then its right one's. */
+static uint32_t right_place(const task* t, uint32_t cut) { return t->node + 2 * (cut - t->begin); }
+
 /* Makes `t` a leaf (false) or splits its range; left and right are the tasks of the children. */
-static bool split(builder* b, const task* t, uint32_t left_node, uint32_t (*right_of)(const task*, uint32_t, uint32_t), bins* scratch, bool wide, task* left, task* right)
+static bool split(builder* b, const task* t, bins* scratch, bool wide, task* left, task* right)
 {
     split_node* node = &b->tree[t->node];
     extent e;
@@ -189,7 +221,7 @@ static bool split(builder* b, const task* t, uint32_t left_node, uint32_t (*righ
     node->first = t->begin;
     node->count = count;
     if (count <= 2) return false;
-    axis_scale s = scale_of(&e);
+    axis_scale s = scale_of(&e, count);
     int axis = 0;
     uint32_t plane = 0;
     float cost = 0.0f;
@@ -197,26 +229,22 @@ static bool split(builder* b, const task* t, uint32_t left_node, uint32_t (*righ
         fill_bins_wide(b, t->begin, t->end, &s, &scratch[0], scratch + 1);
     else
         fill_bins(b->items, t->begin, t->end, &s, &scratch[0]);
-    bool found = t->depth < MAX_DEPTH && best_plane(&scratch[0], &axis, &plane, &cost);
+    bool found = t->depth < MAX_DEPTH && best_plane(&scratch[0], s.bins, &axis, &plane, &cost);
     /* A block of eight is tested at once: splitting one pays only when the halves are much smaller than the whole. */
-    if (count <= LEAF && (!found || cost >= 0.5f * half_area(&e.box) * (float)count)) return false;
+    if (count <= LEAF && (!found || cost >= 0.42f * half_area(&e.box) * (float)count)) return false;
     uint32_t cut = found ? partition(b->items, t->begin, t->end, &s, axis, plane) : t->begin + count / 2;
     node->count = 0;
-    node->left = left_node;
-    node->right = right_of(t, left_node, cut);
-    *left = (task){node->left, t->begin, cut, t->depth + 1};
-    *right = (task){node->right, cut, t->end, t->depth + 1};
+    node->first = right_place(t, cut);
+    *left = (task){t->node + 1, t->begin, cut, t->depth + 1};
+    *right = (task){node->first, cut, t->end, t->depth + 1};
     return true;
 }
-
-/* A subtree of n triangles has at most 2 n - 1 nodes: its root, then its left subtree's places, then its right one's. */
-static uint32_t right_place(const task* t, uint32_t left_node, uint32_t cut) { return left_node + 2 * (cut - t->begin) - 1; }
 
 static void build_subtree(builder* b, task t, bins* scratch)
 {
     task left, right;
     /* the depth is bounded: MAX_DEPTH levels by area, then halves */
-    while (split(b, &t, t.node + 1, right_place, scratch, false, &left, &right)) {
+    while (split(b, &t, scratch, false, &left, &right)) {
         build_subtree(b, left, scratch);
         t = right;
     }
@@ -242,10 +270,10 @@ static void make_items(void* user, uint32_t begin, uint32_t end, uint32_t worker
             grow(&box, v, v);
         }
         item* i = &job->items[p];
-        memcpy(i->min, box.min, sizeof i->min);
-        memcpy(i->max, box.max, sizeof i->max);
-        i->primitive = p;
-        i->unused = 0;
+        memcpy(i->min, box.min, sizeof box.min);
+        memcpy(i->max, box.max, sizeof box.max);
+        memcpy(&i->min[3], &p, sizeof p);
+        i->max[3] = 0.0f;
     }
 }
 
@@ -272,8 +300,8 @@ static uint32_t collect(const split_node* tree, uint32_t root, uint32_t children
         }
         if (best < 0) break;
         uint32_t open = children[best];
-        children[best] = tree[open].left;
-        children[count++] = tree[open].right;
+        children[best] = open + 1;
+        children[count++] = tree[open].first;
     }
     return count;
 }
@@ -305,7 +333,7 @@ static uint32_t emit(es_bvh* bvh, const builder* b, uint32_t root, wide_counts* 
             continue;
         }
         es_bvh_block* block = &bvh->blocks[used->blocks];
-        for (uint32_t k = 0; k < ES_BVH_WIDTH; k++) block->primitive[k] = k < child->count ? b->items[child->first + k].primitive : ES_NO_PRIMITIVE;
+        for (uint32_t k = 0; k < ES_BVH_WIDTH; k++) block->primitive[k] = k < child->count ? primitive_of(&b->items[child->first + k]) : ES_NO_PRIMITIVE;
         bvh->nodes[at].child[i] = ES_BVH_BLOCK | used->blocks++;
     }
     return at;
@@ -342,7 +370,7 @@ es_result es_bvh_build_nodes(es_bvh* bvh)
             if (t.end - t.begin <= limit) {
                 if (!es_grow(context, (void**)&b.tasks, &task_capacity, task_count, (size_t)task_count + 1, sizeof *b.tasks)) result = es_context_last_result(context);
                 if (!result) b.tasks[task_count++] = t;
-            } else if (split(&b, &t, t.node + 1, right_place, scratch, true, &left, &right)) {
+            } else if (split(&b, &t, scratch, true, &left, &right)) {
                 waiting[waiting_count++] = right;
                 waiting[waiting_count++] = left;
             }
@@ -392,11 +420,14 @@ static void fit_blocks(void* user, uint32_t begin, uint32_t end, uint32_t worker
     }
 }
 
-void es_bvh_fit(es_bvh* bvh)
+/* Areas of the children of some nodes: of nodes, and of blocks times their triangles. */
+typedef struct areas { double nodes, leaves; } areas;
+
+/* The boxes of nodes [begin, end), from the last: children come after their parents, and those outside the range are fit already. */
+static areas fit_nodes(es_bvh* bvh, uint32_t begin, uint32_t end)
 {
-    es_parallel_for(bvh->context, bvh->block_count, 512, fit_blocks, bvh);
-    double nodes = 0.0, leaves = 0.0;
-    for (uint32_t i = bvh->node_count; i-- > 0;) {
+    areas sum = {0.0, 0.0};
+    for (uint32_t i = end; i-- > begin;) {
         es_bvh_node* node = &bvh->nodes[i];
         for (int c = 0; c < ES_BVH_WIDTH; c++) {
             es_bvh_box box = no_box();
@@ -418,10 +449,55 @@ void es_bvh_fit(es_bvh* bvh)
             }
             double area = half_area(&box);
             if (triangles)
-                leaves += area * triangles;
+                sum.leaves += area * triangles;
             else
-                nodes += area;
+                sum.nodes += area;
         }
+    }
+    return sum;
+}
+
+/* Subtrees lie one after another (emit): those of the root's grandchildren are fit side by side, then the few nodes above them. */
+enum { TOP_NODES = 1 + ES_BVH_WIDTH, SUBTREES = ES_BVH_WIDTH * ES_BVH_WIDTH };
+typedef struct fit_job {
+    es_bvh* bvh;
+    uint32_t begin[SUBTREES], end[SUBTREES];
+    areas sums[SUBTREES];
+} fit_job;
+
+static void fit_subtrees(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    fit_job* job = user;
+    for (uint32_t i = begin; i < end; i++) job->sums[i] = fit_nodes(job->bvh, job->begin[i], job->end[i]);
+}
+
+void es_bvh_fit(es_bvh* bvh)
+{
+    es_parallel_for(bvh->context, bvh->block_count, 512, fit_blocks, bvh);
+    fit_job job = {.bvh = bvh};
+    uint32_t top[TOP_NODES], top_count = 0, count = 0, last = ES_NO_PRIMITIVE;
+    top[top_count++] = 0;
+    for (int c = 0; c < ES_BVH_WIDTH; c++) {
+        uint32_t child = bvh->nodes[0].child[c];
+        if (child & ES_BVH_BLOCK) continue;
+        if (last != ES_NO_PRIMITIVE) job.end[last] = child;
+        last = ES_NO_PRIMITIVE;
+        top[top_count++] = child;
+        for (int g = 0; g < ES_BVH_WIDTH; g++) {
+            uint32_t grandchild = bvh->nodes[child].child[g];
+            if (grandchild & ES_BVH_BLOCK) continue;
+            if (last != ES_NO_PRIMITIVE) job.end[last] = grandchild;
+            last = count++;
+            job.begin[last] = grandchild;
+        }
+    }
+    if (last != ES_NO_PRIMITIVE) job.end[last] = bvh->node_count;
+    es_parallel_for(bvh->context, count, 1, fit_subtrees, &job);
+    areas sum = {0.0, 0.0};
+    for (uint32_t i = 0; i < count; i++) sum = (areas){sum.nodes + job.sums[i].nodes, sum.leaves + job.sums[i].leaves};
+    while (top_count--) {
+        areas part = fit_nodes(bvh, top[top_count], top[top_count] + 1);
+        sum = (areas){sum.nodes + part.nodes, sum.leaves + part.leaves};
     }
     bvh->bounds = no_box();
     for (int c = 0; c < ES_BVH_WIDTH; c++) {
@@ -430,5 +506,5 @@ void es_bvh_fit(es_bvh* bvh)
         grow(&bvh->bounds, low, high);
     }
     double whole = half_area(&bvh->bounds);
-    bvh->cost = whole > 0.0 ? (float)((whole + nodes + leaves) / whole) : 0.0f;
+    bvh->cost = whole > 0.0 ? (float)((whole + sum.nodes + sum.leaves) / whole) : 0.0f;
 }
