@@ -160,55 +160,116 @@ VINL void take_nearest(const es_bvh_block* block, const ray_setup* s, vf low, fl
     }
 }
 
-static void closest(const es_bvh* bvh, const es_ray* ray, es_hit* hit)
-{
-    *hit = (es_hit){ray->max, 0.0f, 0.0f, ES_NO_PRIMITIVE};
+/* ---- single rays, some at a time --------------------------------------------------------------------------------------------- */
+
+/* A ray on its way. Several take turns, a node or a block each, so that what one needs next is fetched while others go on. */
+typedef struct walk {
     ray_setup s;
-    prepare(ray, &s);
-    const vf low = vf_set1(ray->min);
-    entry stack[ES_BVH_STACK], at = {0, ray->min};
-    uint32_t size = 0;
-    float nearest = ray->max;
-    for (;;) {
-        if (at.child & ES_BVH_BLOCK) {
-            take_nearest(&bvh->blocks[at.child & ~ES_BVH_BLOCK], &s, low, at.distance, &nearest, hit);
-        } else {
-            const es_bvh_node* node = &bvh->nodes[at.child];
-            vf distance;
-            uint32_t bits = meet_node(node, &s, low, nearest, &distance);
-            if (bits) {
-                at = push(node->child, bits, distance, stack, &size);
-                continue;
-            }
-        }
-        do {
-            if (!size) return;
-            size--;
-        } while (stack[size].distance > nearest * FAR_MARGIN);
-        at = stack[size];
-    }
+    entry at;
+    uint32_t size, ray;
+    float nearest;
+    vf low;
+    entry stack[ES_BVH_STACK];
+} walk;
+enum { WALKS = 6, FEW_WALKS = 2, FEW_NODES = 16384 }; /* a small hierarchy is in the near caches anyway */
+
+static inline void fetch(const es_bvh* bvh, uint32_t child)
+{
+    const char* p = child & ES_BVH_BLOCK ? (const char*)&bvh->blocks[child & ~ES_BVH_BLOCK] : (const char*)&bvh->nodes[child];
+    for (int i = 0; i < 5; i++) __builtin_prefetch(p + 64 * i);
 }
 
-static bool any(const es_bvh* bvh, const es_ray* ray)
+static inline void start(walk* w, const es_ray* ray, uint32_t index)
 {
-    ray_setup s;
-    prepare(ray, &s);
-    const vf low = vf_set1(ray->min), high = vf_set1(ray->max);
-    uint32_t stack[ES_BVH_STACK], size = 0, at = 0;
-    for (;;) {
-        if (!(at & ES_BVH_BLOCK)) {
-            vf distance;
-            uint32_t bits = meet_node(&bvh->nodes[at], &s, low, ray->max, &distance);
-            const uint32_t* child = bvh->nodes[at].child;
-            for (; bits; bits &= bits - 1) stack[size++] = child[__builtin_ctz(bits)];
-        } else {
-            vf t = vf_zero(), v = vf_zero(), w = vf_zero();
-            vm hit = meet_block(&bvh->blocks[at & ~ES_BVH_BLOCK], &s, low, high, &t, &v, &w);
-            if (vm_any(hit & vm_lt(t, high))) return true;
+    prepare(ray, &w->s);
+    w->at = (entry){0, ray->min};
+    w->size = 0;
+    w->ray = index;
+    w->nearest = ray->max;
+    w->low = vf_set1(ray->min);
+}
+
+static inline void move_to(walk* to, const walk* from)
+{
+    to->s = from->s;
+    to->at = from->at;
+    to->size = from->size;
+    to->ray = from->ray;
+    to->nearest = from->nearest;
+    to->low = from->low;
+    memcpy(to->stack, from->stack, from->size * sizeof from->stack[0]);
+}
+
+/* One node or block; false when there are no more. */
+static inline bool step_closest(const es_bvh* bvh, walk* w, es_hit* hit)
+{
+    if (w->at.child & ES_BVH_BLOCK) {
+        take_nearest(&bvh->blocks[w->at.child & ~ES_BVH_BLOCK], &w->s, w->low, w->at.distance, &w->nearest, hit);
+    } else {
+        const es_bvh_node* node = &bvh->nodes[w->at.child];
+        vf distance;
+        uint32_t bits = meet_node(node, &w->s, w->low, w->nearest, &distance);
+        if (bits) {
+            w->at = push(node->child, bits, distance, w->stack, &w->size);
+            fetch(bvh, w->at.child);
+            return true;
         }
-        if (!size) return false;
-        at = stack[--size];
     }
+    do {
+        if (!w->size) return false;
+        w->size--;
+    } while (w->stack[w->size].distance > w->nearest * FAR_MARGIN);
+    w->at = w->stack[w->size];
+    fetch(bvh, w->at.child);
+    return true;
+}
+
+static inline bool step_any(const es_bvh* bvh, walk* w, uint8_t* blocked)
+{
+    if (w->at.child & ES_BVH_BLOCK) {
+        vf t = vf_zero(), v = vf_zero(), u = vf_zero(), high = vf_set1(w->nearest);
+        vm hit = meet_block(&bvh->blocks[w->at.child & ~ES_BVH_BLOCK], &w->s, w->low, high, &t, &u, &v);
+        if (vm_any(hit & vm_lt(t, high))) {
+            *blocked = 1;
+            return false;
+        }
+    } else {
+        vf distance;
+        uint32_t bits = meet_node(&bvh->nodes[w->at.child], &w->s, w->low, w->nearest, &distance);
+        const uint32_t* child = bvh->nodes[w->at.child].child;
+        for (; bits; bits &= bits - 1) w->stack[w->size++].child = child[__builtin_ctz(bits)];
+    }
+    if (!w->size) return false;
+    w->at.child = w->stack[--w->size].child;
+    fetch(bvh, w->at.child);
+    return true;
+}
+
+/* hits or blocked is NULL */
+VINL void by_turns(const es_bvh* bvh, const es_ray* rays, uint32_t count, es_hit* hits, uint8_t* blocked)
+{
+    walk walks[WALKS];
+    const uint32_t most_walks = bvh->node_count < FEW_NODES ? FEW_WALKS : WALKS;
+    uint32_t next = 0, under_way = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        if (hits)
+            hits[i] = (es_hit){rays[i].max, 0.0f, 0.0f, ES_NO_PRIMITIVE};
+        else
+            blocked[i] = 0;
+    }
+    for (; next < count && under_way < most_walks; next++) start(&walks[under_way++], &rays[next], next);
+    while (under_way)
+        for (uint32_t i = 0; i < under_way; i++) {
+            walk* w = &walks[i];
+            if (hits ? step_closest(bvh, w, &hits[w->ray]) : step_any(bvh, w, &blocked[w->ray])) continue;
+            if (next < count) {
+                start(w, &rays[next], next);
+                next++;
+            } else if (i < --under_way) {
+                move_to(w, &walks[under_way]);
+                i--;
+            }
+        }
 }
 
 /* ---- eight rays of one octant ----------------------------------------------------------------------------------------------------- */
@@ -296,7 +357,7 @@ static void closest_together(const es_bvh* bvh, const es_ray* rays, es_hit* hits
 {
     ray_packet p;
     if (!gather(&p, rays)) {
-        for (int i = 0; i < VW; i++) closest(bvh, &rays[i], &hits[i]);
+        by_turns(bvh, rays, VW, hits, NULL);
         return;
     }
     float nearest[VW], farthest = rays[0].max;
@@ -340,7 +401,7 @@ static void any_together(const es_bvh* bvh, const es_ray* rays, uint8_t* blocked
 {
     ray_packet p;
     if (!gather(&p, rays)) {
-        for (int i = 0; i < VW; i++) blocked[i] = any(bvh, &rays[i]);
+        by_turns(bvh, rays, VW, NULL, blocked);
         return;
     }
     vf nearest;
@@ -374,12 +435,12 @@ void ES_KERNEL(es_gi_trace_closest)(const es_bvh* bvh, bool coherent, const es_r
 {
     uint32_t i = 0;
     for (; coherent && i + VW <= count; i += VW) closest_together(bvh, rays + i, hits + i);
-    for (; i < count; i++) closest(bvh, &rays[i], &hits[i]);
+    if (i < count) by_turns(bvh, rays + i, count - i, hits + i, NULL);
 }
 
 void ES_KERNEL(es_gi_trace_any)(const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked)
 {
     uint32_t i = 0;
     for (; coherent && i + VW <= count; i += VW) any_together(bvh, rays + i, blocked + i);
-    for (; i < count; i++) blocked[i] = any(bvh, &rays[i]);
+    if (i < count) by_turns(bvh, rays + i, count - i, NULL, blocked + i);
 }
