@@ -22,6 +22,9 @@
  * reference, measured and not assumed: it has in it what finer light G-buffers would still do, and pixels at whose centres the
  * rasterizer, on its grid of 1/256 pixel, sees another triangle than the ray does.
  *
+ * The pictures are smaller than those the method is meant for, or the rays would take too long. Of the causes this touches one: the pattern
+ * and the filter span 8 × 8 pixels of whatever size, so their part shrinks as pictures grow.
+ *
  * Besides, for scale: the light of further bounces, which the method leaves out and R has not, and the error of direct light. */
 #include "bench.h"
 #include "ledger_pictures.h"
@@ -386,7 +389,7 @@ static int write_report(bench_report* report, const bench_options* options, cons
     snprintf(plot.headline, sizeof plot.headline, "%s", report->finding);
     snprintf(plot.caption, sizeof plot.caption,
         "Each cause's part of the squared error, by its projection on the total error: the parts sum to 100 %%. To the left of zero stand causes that hide some of what others do wrong. "
-        "Indirect light of one bounce, default settings, %u × %u.",
+        "Indirect light of one bounce, default settings, %u × %u: on larger pictures (--size) the interleaved pattern covers less of the scene and costs less.",
         effort_of(options, &scenes[0]).width, effort_of(options, &scenes[0]).height);
     bench_report_bars(report, &plot);
     for (size_t k = 0; k < plot.bar_count; k++)
