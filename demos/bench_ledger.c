@@ -34,7 +34,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MOST_FRAMES = 3, PREDECESSORS = 2, PARTS = LEDGER_CAUSES + 1, ROWS_A_SCENE = 4 * PARTS + 8, SHOWN_WIDTH = 256 };
+enum { MOST_FRAMES = 3, PREDECESSORS = 2, PARTS = LEDGER_CAUSES + 1, ROWS_A_SCENE = 4 * PARTS + 8, SHOWN_WIDTH = 256, PATTERN = 8 };
 static const double fps = 30, most_unexplained = 10;
 
 typedef struct ledger_scene {
@@ -144,28 +144,31 @@ static void add_png(demo_text* page, es_context* context, const bench_options* o
     fclose(file);
 }
 
-/* Mean of both halves over squares of pixels, so that it is as small as it is shown; one channel: the mean of all. */
-static bool shrink(es_context* context, const ledger_effort* e, const ledger_picture* picture, uint32_t channels, float scale, es_image* small)
+/* Mean of both halves over n × n pixels for each pixel that is shown, so many as come near to SHOWN_WIDTH; n at least `least`, then the
+ * squares overlap. One channel: the mean of all. */
+static bool shrink(es_context* context, const ledger_effort* e, const ledger_picture* picture, uint32_t channels, uint32_t least, float scale, es_image* small)
 {
-    const uint32_t n = e->width > SHOWN_WIDTH ? e->width / SHOWN_WIDTH : 1;
-    if (es_image_create(context, e->width / n, e->height / n, channels, small) != ES_OK) return false;
+    const uint32_t step = (e->width + SHOWN_WIDTH / 2) / SHOWN_WIDTH > 1 ? (e->width + SHOWN_WIDTH / 2) / SHOWN_WIDTH : 1, n = step > least ? step : least;
+    if (e->width < n || e->height < n || es_image_create(context, e->width / step, e->height / step, channels, small) != ES_OK) return false;
     const float weight = scale * 0.5f * (float)channels / (3.0f * (float)(n * n));
-    for (uint32_t y = 0; y < small->height * n; y++)
-        for (uint32_t x = 0; x < small->width * n; x++)
-            for (uint32_t k = 0; k < 3; k++) {
-                size_t from = ((size_t)y * e->width + x) * 3 + k, to = ((size_t)(y / n) * small->width + x / n) * channels + (channels == 3 ? k : 0);
+    for (uint32_t y = 0; y < small->height; y++)
+        for (uint32_t x = 0; x < small->width; x++) {
+            uint32_t left = x * step + n <= e->width ? x * step : e->width - n, top = y * step + n <= e->height ? y * step : e->height - n;
+            for (uint32_t i = 0; i < n * n * 3; i++) {
+                size_t from = ((size_t)(top + i / (3 * n)) * e->width + left) * 3 + i % (3 * n), to = ((size_t)y * small->width + x) * channels + (channels == 3 ? i % 3 : 0);
                 small->pixels[to] += weight * (picture->half[0][from] + picture->half[1][from]);
             }
+        }
     return true;
 }
 
-static void add_error_picture(demo_text* page, es_context* context, const bench_options* options, const ledger_effort* e, const ledger_picture* d, float scale, const char* scene,
-    const char* id, const char* caption)
+static void add_error_picture(demo_text* page, es_context* context, const bench_options* options, const ledger_effort* e, const ledger_picture* d, uint32_t least, float scale,
+    const char* scene, const char* id, const char* caption)
 {
     es_image values, colours;
     es_image_save_desc desc = demo_save_desc();
     desc.already_srgb = true;
-    if (!shrink(context, e, d, 1, 1, &values)) return;
+    if (!shrink(context, e, d, 1, least, 1, &values)) return;
     if (es_image_false_colour(context, &values, scale, true, &colours) == ES_OK) {
         add_png(page, context, options, &colours, &desc, scene, id, caption);
         es_image_destroy(context, &colours);
@@ -178,7 +181,7 @@ static void add_light_picture(demo_text* page, es_context* context, const bench_
 {
     es_image small;
     es_image_save_desc desc = demo_save_desc();
-    if (!shrink(context, e, light, 3, scale, &small)) return;
+    if (!shrink(context, e, light, 3, 1, scale, &small)) return;
     add_png(page, context, options, &small, &desc, scene, id, caption);
     es_image_destroy(context, &small);
 }
@@ -202,15 +205,15 @@ static void add_pictures(bench_report* report, const bench_options* options, es_
     add_light_picture(page, context, options, e, &frame->reference, exposure, scene->name, "reference", "the reference");
     for (int h = 0; h < 2; h++)
         for (size_t k = 0; k < frame->floats; k++) difference[h][k] = frame->method.half[h][k] - frame->reference.half[h][k];
-    add_error_picture(page, context, options, e, &rest, scale, scene->name, "total", "total error");
+    add_error_picture(page, context, options, e, &rest, 1, scale, scene->name, "total", "total error");
     for (int i = 0; i < LEDGER_CAUSES; i++) {
-        add_error_picture(page, context, options, e, &frame->parts[i], scale, scene->name, causes[i].id, causes[i].name);
+        add_error_picture(page, context, options, e, &frame->parts[i], i == LEDGER_LIGHT_VIEW ? PATTERN : 1, scale, scene->name, causes[i].id, causes[i].name);
         for (int h = 0; h < 2; h++)
             for (size_t k = 0; k < frame->floats; k++) difference[h][k] -= frame->parts[i].half[h][k];
     }
-    add_error_picture(page, context, options, e, &rest, scale, scene->name, causes[LEDGER_REST].id, causes[LEDGER_REST].name);
+    add_error_picture(page, context, options, e, &rest, PATTERN, scale, scene->name, causes[LEDGER_REST].id, causes[LEDGER_REST].name);
     demo_text_add(page, "</div>\n<figcaption>Indirect light, and errors in false colour: yellow is too much light, blue too little, black is right; full colour is three times the total "
-                        "error's root mean square, and all have this scale. The parts sum to the total, pixel by pixel. Grain is the reference's, and that of the many sets of lights.</figcaption></figure>\n");
+                        "error's root mean square, and all have this scale. The parts sum to the total, pixel by pixel. Grain is the reference's, and that of the many sets of lights; the light G-buffer and what is unexplained would be hardly more than that and are shown as means over 8 × 8 pixels.</figcaption></figure>\n");
     free(difference[0]);
     free(difference[1]);
 }
