@@ -31,12 +31,15 @@ size_t bench_error_rows(bench_row* rows, size_t capacity)
     return count < capacity ? count : capacity;
 }
 
+/* The frame without indirect light is drawn to compare with; it is nobody's choice. */
+static bool is_choice(const error_point* point) { return strcmp(point->setting->settings, "gi=none") != 0; }
+
 const error_point* error_best_within(const error_scene* scene, double milliseconds)
 {
     const error_point* best = NULL;
     for (size_t i = 0; i < scene->count; i++) {
         const error_point* point = &scene->points[i];
-        if (point->milliseconds <= milliseconds && (!best || point->error.relrmse < best->error.relrmse)) best = point;
+        if (is_choice(point) && point->milliseconds <= milliseconds && (!best || point->error.relrmse < best->error.relrmse)) best = point;
     }
     return best;
 }
@@ -45,7 +48,7 @@ static const error_point* fastest(const error_scene* scene)
 {
     const error_point* best = NULL;
     for (size_t i = 0; i < scene->count; i++)
-        if (!best || scene->points[i].milliseconds < best->milliseconds) best = &scene->points[i];
+        if (is_choice(&scene->points[i]) && (!best || scene->points[i].milliseconds < best->milliseconds)) best = &scene->points[i];
     return best;
 }
 
@@ -134,7 +137,7 @@ static void add_settings(plot_curves* plot, const error_scene* scene, measure wh
         if (!series || strcmp(series->name, p->setting->series) != 0) {
             series = plot_add_series(plot, p->setting->colour, "%s", p->setting->series);
             series->line = p->setting->line;
-            series->competes = true;
+            series->competes = is_choice(p);
         }
         plot_add_point(plot, series, p->milliseconds, measure_of(&p->error, p->flicker, which), "%s; relRMSE %.3f, relMSE %.2g, FLIP %.3f of the indirect light, flicker %.3f",
             p->setting->label, p->error.relrmse, p->error.relmse, p->error.flip, p->flicker);
@@ -185,7 +188,7 @@ static void least_headline(const error_scene* scene, measure which, char text[PL
     for (size_t i = 0; i < scene->count; i++) {
         const error_point* p = &scene->points[i];
         double value = measure_of(&p->error, p->flicker, which);
-        if (isnan(value) || !strcmp(p->setting->settings, "gi=none")) continue;
+        if (isnan(value) || !is_choice(p)) continue;
         if (!least || value < measure_of(&least->error, least->flicker, which)) least = p;
         if (p->milliseconds <= frame_budget && (!fast || value < measure_of(&fast->error, fast->flicker, which))) fast = p;
     }
@@ -215,7 +218,7 @@ static void add_setting_plot(bench_report* report, const error_scene* scene, mea
     if (scene->is_room) {
         add_curve(&plot, &scene->embree.raw, "Embree's path tracer", 1, true, 1000, scene->embree.primary_seconds, which);
         add_curve(&plot, &scene->embree.filtered, "Embree's, and an 8×8 filter", 1, true, 1000, scene->embree.primary_seconds, which);
-        add_curve(&plot, &scene->ours, "our path tracer", 7, true, 1000, 0, which);
+        add_curve(&plot, &scene->ours, "our path tracer", 7, false, 1000, 0, which);
     }
     plot_add_rule(&plot, true, frame_budget, "50 ms");
     plot_mark_front(&plot);

@@ -299,7 +299,8 @@ static void draw_series(drawing* d, const plot_series* series)
 static void draw_name(drawing* d, const plot_series* series)
 {
     static const double offsets[8][3] = {{10, 4, 0}, {8, -8, 0}, {8, 16, 0}, {0, -11, 0.5}, {0, 20, 0.5}, {-10, 4, 1}, {-8, -8, 1}, {-8, 16, 1}}; /* x, y, share of the width to its left */
-    double w = plot_text_width(series->name, FONT) * 1.06, best = INFINITY, best_x = 0, best_y = 0;
+    static const char* const anchors[3] = {"start", "middle", "end"};
+    double w = plot_text_width(series->name, FONT) * 1.14, best = INFINITY, best_x = 0, best_y = 0, best_share = 0;
     for (size_t i = 0; i < series->count; i++) {
         const plot_point* p = &series->points[series->count - 1 - i];
         if (!is_drawn(d, p)) continue;
@@ -308,14 +309,14 @@ static void draw_name(drawing* d, const plot_series* series)
             box b = {x, y - 11, x + w, y + 3};
             bool outside = b.x0 < LEFT + 2 || b.x1 > WIDTH - RIGHT + 12 || b.y0 < TOP || b.y1 > HEIGHT - BOTTOM - 2;
             double cost = overlap(d, b) + 6.0 * (i == 0 ? 0 : i == series->count - 1 ? 1 : 2) + k * 0.5 + (outside ? 1e5 : 0);
-            if (cost < best) best = cost, best_x = x, best_y = y;
+            if (cost < best) best = cost, best_x = x, best_y = y, best_share = offsets[k][2];
         }
     }
     if (!isfinite(best)) return;
     take(d, (box){best_x, best_y - 11, best_x + w, best_y + 3});
     demo_text_add(d->text,
-        "<text x=\"%.1f\" y=\"%.1f\" fill=\"%s\" font-weight=\"600\" stroke=\"#fff\" stroke-width=\"3.5\" stroke-linejoin=\"round\" paint-order=\"stroke\">", best_x, best_y,
-        plot_text_colours[series->colour]);
+        "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\" font-weight=\"600\" stroke=\"#fff\" stroke-width=\"3.5\" stroke-linejoin=\"round\" paint-order=\"stroke\">",
+        best_x + best_share * w, best_y, anchors[(int)(best_share * 2)], plot_text_colours[series->colour]);
     plot_add_escaped(d->text, series->name);
     demo_text_add(d->text, "</text>\n");
 }
