@@ -213,10 +213,10 @@ static bool wants_room(const bench_options* options)
 {
     for (size_t i = 0; i < options->scene_count; i++)
         if (!strcmp(options->scenes[i], "room")) return true;
-    return false;
+    return !options->scene_count;
 }
 
-static int write_report(const run* r, error_scene* scenes, size_t count)
+static int write_report(const run* r, error_scene* scenes, size_t count, const char* no_peers)
 {
     bench_report report = {.name = "error", .title = "How wrong each method is, for the time it takes",
         .about = "Whole frames, nothing skipped, against path-traced truth with one indirect bounce. Times are medians, taken in one sitting on the machine below."};
@@ -229,6 +229,9 @@ static int write_report(const run* r, error_scene* scenes, size_t count)
         error_add_plots(&report, &scenes[i], r->width, r->height);
     }
     demo_text_add(&report.members, "\n]");
+    for (size_t i = 0; i < all_count; i++)
+        if (all[i].judge != BENCH_NONE && isnan(all[i].judge == BENCH_VALUE_AT_LEAST ? all[i].value : all[i].ratio) && !all[i].note[0])
+            snprintf(all[i].note, sizeof all[i].note, "%s", no_peers[0] ? no_peers : "the room was not among the scenes");
     for (size_t i = 0; i < all_count; i++)
         if (bench_wants(r->options, all[i].id) && (all[i].judge != BENCH_NONE || !isnan(all[i].value))) rows[row_count++] = all[i];
     bench_print(rows, row_count);
@@ -248,7 +251,7 @@ int bench_error(const bench_options* options)
     size_t count = 0;
     int code = peer && scenes ? DEMO_OK : demo_refuse("out of memory");
     if (code == DEMO_OK) {
-        bench_peer_open(peer, BENCH_EMBREE_PATHS, !options->no_peer && (!options->scene_count || wants_room(options)));
+        bench_peer_open(peer, BENCH_EMBREE_PATHS, !options->no_peer && wants_room(options));
         choose_scenes(options, peer->folder, scenes, &count);
     }
     for (size_t i = 0; i < count && code == DEMO_OK; i++) {
@@ -257,7 +260,7 @@ int bench_error(const bench_options* options)
         close_scene(&r);
         if (code == DEMO_OK) fprintf(stderr, "%s: %.0f s\n", scenes[i].name, demo_seconds() - start);
     }
-    if (code == DEMO_OK) code = write_report(&r, scenes, count);
+    if (code == DEMO_OK) code = write_report(&r, scenes, count, wants_room(options) ? peer->why : "");
     for (size_t i = 0; i < count; i++) {
         error_truth_free(r.context, &scenes[i].truth);
         free(scenes[i].agreement.deviations);

@@ -67,21 +67,25 @@ static void add_tick(plot_axis* axis, double value, bool small)
     if (!small && axis->tick_count < sizeof axis->ticks / sizeof axis->ticks[0]) axis->ticks[axis->tick_count++] = value;
 }
 
+static void choose_plain_ticks(plot_axis* axis)
+{
+    double rough = (axis->high - axis->low) / fmax(3, fabs(axis->end - axis->begin) / 90), power = pow(10, floor(log10(rough)));
+    double step = power * (rough / power > 5 ? 10 : rough / power > 2 ? 5 : rough / power > 1 ? 2 : 1);
+    for (double k = ceil(axis->low / step - 1e-9); k * step <= axis->high * (1 + 1e-9); k++) add_tick(axis, k * step == 0 ? 0 : k * step, false);
+}
+
 static void choose_log_ticks(plot_axis* axis)
 {
+    if (axis->high < 5 * axis->low) { /* too short for powers of ten */
+        choose_plain_ticks(axis);
+        return;
+    }
     double decades = log10(axis->high / axis->low), per_decade = fabs(axis->end - axis->begin) / fmax(decades, 1e-6);
     for (int k = (int)floor(log10(axis->low)); k <= (int)ceil(log10(axis->high)); k++)
         for (int m = 1; m <= 9; m++) {
             bool labelled = m == 1 || (per_decade > 110 && (m == 2 || m == 5)) || (per_decade > 260 && (m == 3 || m == 7));
             add_tick(axis, m * pow(10, k), !labelled);
         }
-}
-
-static void choose_plain_ticks(plot_axis* axis)
-{
-    double rough = (axis->high - axis->low) / fmax(3, fabs(axis->end - axis->begin) / 90), power = pow(10, floor(log10(rough)));
-    double step = power * (rough / power > 5 ? 10 : rough / power > 2 ? 5 : rough / power > 1 ? 2 : 1);
-    for (double k = ceil(axis->low / step - 1e-9); k * step <= axis->high * (1 + 1e-9); k++) add_tick(axis, k * step == 0 ? 0 : k * step, false);
 }
 
 plot_axis plot_make_axis(bool logarithmic, double low, double high, double begin, double end)

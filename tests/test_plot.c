@@ -81,6 +81,8 @@ static void test_axes(void** state)
     }
     assert_true(has_hundred && axis.tick_count >= 3 && axis.tick_count < 40);
     assert_near(plot_position(&axis, sqrt(20.0 * 30000)), 500, 1e-6);
+    axis = plot_make_axis(true, 1.7, 2.6, 0, 400); /* no power of ten in it */
+    assert_true(axis.tick_count >= 3);
     axis = plot_make_axis(false, 0, 1.7, 0, 800);
     assert_near(plot_position(&axis, 0), 0, 1e-9);
     assert_true(axis.ticks[0] == 0 && axis.tick_count >= 3);
