@@ -131,7 +131,7 @@ ES_API size_t es_renderer_points(const es_renderer* renderer, uint32_t map, floa
 /* ---- reference: a progressive path tracer over the same world ------------------------------------------------------------------- */
 
 /* All of them by name through es_reference_settings_set. Every vertex of a path samples the lights and the surface, combined by
- * multiple importance sampling (Veach 1997). Samples are a function of pixel and sample number alone: any number of threads, any
+ * multiple importance sampling (Veach 1997), and neighbouring pixels share their paths (Bekaert et al. 2002). Samples are a function of pixel and sample number alone: any number of threads, any
  * instruction set and any split into calls or files give the same bits. */
 typedef struct es_reference_settings {
     uint32_t width, height;   /* pixels */
@@ -140,6 +140,8 @@ typedef struct es_reference_settings {
     bool antialias;           /* rays over the pixel's area; off: through its centre, as the real-time methods sample */
     bool emission;            /* glowing surfaces and the environment light others; off: as the real-time methods that cannot */
     bool quantised;           /* the first hit's normal, colour and roughness are rounded as the G-buffer stores them */
+    uint32_t share;           /* side of the tiles of pixels that share what their paths find, 1 … 8: less noise, but of tiles rather than of pixels, so
+                               * that means over many pixels are no better; 1: pixels are independent of each other */
     uint32_t max_samples;     /* per pixel; 0: no limit */
     float max_seconds;        /* 0: no limit */
     float max_error;          /* relRMSE of the radiance by its own estimate; 0: no limit */

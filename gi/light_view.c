@@ -5,16 +5,19 @@
 
 enum { LIGHT_PLANES = ES_GBUFFER_DEPTH | ES_GBUFFER_NORMAL | ES_GBUFFER_ALBEDO | ES_GBUFFER_SURFACE };
 
+float es_light_cone(const es_light_state* light, es_vec3 towards_point)
+{
+    if (light->type != ES_LIGHT_SPOT) return 1.0f;
+    /* KHR_lights_punctual: linear in the cosine between the cones, squared */
+    float cosine = es_v3_dot(towards_point, light->direction);
+    float width = es_maxf(light->cos_inner - light->cos_outer, 1e-6f);
+    float t = es_clampf((cosine - light->cos_outer) / width, 0.0f, 1.0f);
+    return t * t;
+}
+
 float es_light_falloff(const es_light_state* light, es_vec3 towards_point, float distance)
 {
-    float factor = 1.0f;
-    if (light->type == ES_LIGHT_SPOT) {
-        /* KHR_lights_punctual: linear in the cosine between the cones, squared */
-        float cosine = es_v3_dot(towards_point, light->direction);
-        float width = es_maxf(light->cos_inner - light->cos_outer, 1e-6f);
-        float t = es_clampf((cosine - light->cos_outer) / width, 0.0f, 1.0f);
-        factor = t * t;
-    }
+    float factor = es_light_cone(light, towards_point);
     if (light->type != ES_LIGHT_DIRECTIONAL && light->range > 0.0f) {
         float q = es_minf(distance / light->range, 2.0f), q2 = q * q;
         factor *= es_clampf(1.0f - q2 * q2, 0.0f, 1.0f);

@@ -41,5 +41,7 @@ void es_light_view_free(es_context* context, es_light_view* view);
 /* Radiant intensity (W/sr) or irradiance (W/m², directional) factor of the light towards a point: 0 outside a cone; glTF's
  * smooth edge and range window included, 1 on the axis. */
 float es_light_falloff(const es_light_state* light, es_vec3 towards_point, float distance);
+/* The cone's part of it, 1 for other lights than spots. */
+float es_light_cone(const es_light_state* light, es_vec3 towards_point);
 
 #endif

@@ -19,6 +19,7 @@ static inline es_reference_settings reference_settings(uint32_t width, uint32_t 
     s.width = width;
     s.height = height;
     s.bounces = bounces;
+    s.share = 1; /* independent pixels, for means over many of them */
     return s;
 }
 

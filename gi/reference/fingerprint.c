@@ -5,7 +5,7 @@
 #include "platform/random.h"
 
 /* Goes up when the same world would give other samples. */
-enum { SAMPLES_VERSION = 1 };
+enum { SAMPLES_VERSION = 2 };
 
 static uint64_t texture_hash(uint64_t hash, const es_texture_use* use)
 {
@@ -49,7 +49,7 @@ uint64_t es_reference_fingerprint(const es_reference* r)
 {
     const es_reference_settings* s = &r->settings;
     const es_trace_scene* scene = &r->scene;
-    const uint32_t words[] = {SAMPLES_VERSION, s->width, s->height, s->bounces, s->seed, s->antialias, s->emission, s->quantised, scene->instance_count, scene->material_count,
+    const uint32_t words[] = {SAMPLES_VERSION, s->width, s->height, s->bounces, s->seed, s->antialias, s->emission, s->quantised, s->share, scene->instance_count, scene->material_count,
         scene->light_count, scene->has_environment};
     uint64_t hash = es_hash_bytes(0, words, sizeof words);
     hash = es_hash_bytes(hash, &r->view.view, sizeof r->view.view);

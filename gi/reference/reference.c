@@ -8,7 +8,9 @@
 #include "platform/settings.h"
 
 #define AT(field) offsetof(es_reference_settings, field)
-enum { MAX_BOUNCES = 64 };
+enum { MAX_BOUNCES = ES_PATH_MAX_BOUNCES };
+/* Tiles of pixels that share their paths lie elsewhere after this many samples, so that none of their borders stays visible. */
+enum { SAMPLES_OF_TILING = 4, MAX_SHARE = 8, MAX_SAMPLES = 1 << 26 };
 
 static const es_setting reference_table[] = {
     {"reference.width", ES_SETTING_INT, "1024", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(width)},
@@ -18,6 +20,7 @@ static const es_setting reference_table[] = {
     {"reference.antialias", ES_SETTING_BOOL, "false", 0, 1, NULL, "rays over the pixel's area instead of through its centre", AT(antialias)},
     {"reference.emission", ES_SETTING_BOOL, "true", 0, 1, NULL, "glowing surfaces and the environment light others", AT(emission)},
     {"reference.quantised", ES_SETTING_BOOL, "false", 0, 1, NULL, "first hits are rounded as the G-buffer stores them", AT(quantised)},
+    {"reference.share", ES_SETTING_INT, "8", 1, MAX_SHARE, NULL, "pixels, side of the tiles that share their paths; 1: the noise of pixels is independent", AT(share)},
     {"reference.samples", ES_SETTING_INT, "0", 0, 16777216, NULL, "per pixel at most, 0 no limit", AT(max_samples)},
     {"reference.seconds", ES_SETTING_FLOAT, "0", 0, 1e9, NULL, "at most, 0 no limit", AT(max_seconds)},
     {"reference.error", ES_SETTING_FLOAT, "0", 0, 1000, NULL, "relRMSE of the radiance by its own estimate to stop at, 0 no limit", AT(max_error)},
@@ -65,19 +68,25 @@ static void free_film(es_reference* r)
 {
     es_release(r->context, r->sums, value_count(r) * es_reference_image_count(r) * sizeof *r->sums);
     es_release(r->context, r->squares, value_count(r) * es_reference_square_count(r) * sizeof *r->squares);
-    es_release(r->context, r->row_rays, r->height * sizeof *r->row_rays);
+    es_release(r->context, r->first_hits, (size_t)r->width * r->height * sizeof *r->first_hits);
     r->sums = NULL;
     r->squares = NULL;
-    r->row_rays = NULL;
+    r->first_hits = NULL;
     r->width = r->height = 0;
+}
+
+static void free_content(es_reference* r)
+{
+    es_light_emissions_free(&r->emissions);
+    es_trace_scene_free(&r->scene);
+    free_film(r);
 }
 
 void es_reference_destroy(es_reference* r)
 {
     if (!r) return;
     es_context* context = r->context;
-    es_trace_scene_free(&r->scene);
-    free_film(r);
+    free_content(r);
     es_release(context, r, sizeof *r);
     es_context_count_object(context, -1);
 }
@@ -121,7 +130,9 @@ static es_result begin(es_reference* r, es_world* world)
     if (result) return result;
     r->rays = es_pixel_rays_of_view(&r->view);
     double start = es_seconds();
+    es_light_emissions_free(&r->emissions);
     result = es_trace_scene_take(&r->scene, world, r->settings.emission);
+    if (!result) result = es_light_emissions_create(&r->emissions, &r->scene);
     if (result) return result;
     double built = es_seconds() - start;
     free_film(r);
@@ -130,8 +141,9 @@ static es_result begin(es_reference* r, es_world* world)
     r->bounces = r->settings.bounces;
     r->sums = es_allocate_array(r->context, value_count(r) * es_reference_image_count(r), sizeof *r->sums);
     if (r->sums) r->squares = es_allocate_array(r->context, value_count(r) * es_reference_square_count(r), sizeof *r->squares);
-    if (r->squares) r->row_rays = es_allocate_zero(r->context, r->height * sizeof *r->row_rays);
-    if (!r->row_rays) return es_context_last_result(r->context);
+    if (r->squares && !r->settings.antialias) r->first_hits = es_allocate_array(r->context, (size_t)r->width * r->height, sizeof *r->first_hits);
+    if (!r->squares || (!r->first_hits && !r->settings.antialias)) return es_context_last_result(r->context);
+    r->looked = false;
     r->world = world;
     r->revisions = es_world_get_revisions(world);
     r->stats.build_seconds = built;
@@ -150,8 +162,7 @@ es_result es_reference_begin(es_reference* r, es_world* world)
     es_result result = begin(r, world);
     es_fp_leave(environment);
     if (!result) return ES_OK;
-    es_trace_scene_free(&r->scene);
-    free_film(r);
+    free_content(r);
     return result;
 }
 
@@ -164,50 +175,130 @@ static void add(es_film_sum* s, float value)
     s->sum = sum;
 }
 
-typedef struct sample_job { es_reference* r; uint32_t first, count; } sample_job;
+/* First hits and what lights them, where they do not change from sample to sample. */
+typedef struct look_job { es_reference* r; uint64_t rays; } look_job;
 
-static void sample_rows(void* user, uint32_t begin_row, uint32_t end_row, uint32_t worker)
+static void look(void* user, uint32_t begin_row, uint32_t end_row, uint32_t worker)
+{
+    look_job* job = user;
+    es_reference* r = job->r;
+    uint32_t rays = 0;
+    for (uint32_t y = begin_row; y < end_row; y++)
+        for (uint32_t x = 0; x < r->width; x++) {
+            es_first_hit* first = &r->first_hits[(size_t)y * r->width + x];
+            es_path_start start;
+            es_ray ray = es_path_ray(&r->rays, (float)x, (float)y);
+            rays++;
+            es_trace_closest(&r->scene, ray, true, &first->hit);
+            es_path_begin(&r->scene, &ray, &first->hit, r->settings.quantised, &start);
+            es_vec3 direct = es_path_direct(&r->scene, &start, &rays);
+            first->direct[0] = direct.x;
+            first->direct[1] = direct.y;
+            first->direct[2] = direct.z;
+        }
+    __atomic_fetch_add(&job->rays, rays, __ATOMIC_RELAXED);
+}
+
+static void add_sample(es_reference* r, size_t pixel, es_vec3 emission, es_vec3 direct, const es_vec3* bounce)
+{
+    const size_t plane = value_count(r);
+    const float per_unit = 1.0f / r->unit;
+    float total[3] = {emission.x, emission.y, emission.z}, indirect[3] = {0, 0, 0};
+    for (int k = 0; k < 3; k++) add(&r->sums[pixel * 3 + (size_t)k], total[k]);
+    for (uint32_t b = 0; b <= r->bounces; b++) {
+        es_vec3 of = b ? bounce[b] : es_v3_add(direct, bounce[0]);
+        const float value[3] = {of.x, of.y, of.z};
+        for (int k = 0; k < 3; k++) {
+            size_t at = pixel * 3 + (size_t)k;
+            add(&r->sums[(b + 1) * plane + at], value[k]);
+            r->squares[b * plane + at] += (value[k] * per_unit) * (value[k] * per_unit);
+            total[k] += value[k];
+            if (b) indirect[k] += value[k];
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        size_t at = pixel * 3 + (size_t)k;
+        r->squares[(r->bounces + 1) * plane + at] += (indirect[k] * per_unit) * (indirect[k] * per_unit);
+        r->squares[(r->bounces + 2) * plane + at] += (total[k] * per_unit) * (total[k] * per_unit);
+    }
+}
+
+/* Some samples of all pixels, in one tiling of the film. */
+typedef struct sample_job { es_reference* r; uint32_t first, count, left, top, across; uint64_t rays; } sample_job;
+
+typedef struct tile_pixels {
+    es_path_start starts[ES_PATH_GROUP];
+    es_vec3 direct[ES_PATH_GROUP];
+    uint32_t pixel[ES_PATH_GROUP];
+    es_vec3 bounce[ES_PATH_GROUP * (MAX_BOUNCES + 1)];
+} tile_pixels;
+
+static uint32_t begin_path(const es_reference* r, uint32_t pixel, uint32_t seed, uint32_t sample, es_path_start* start, es_vec3* direct)
+{
+    uint32_t rays = 0, x = pixel % r->width, y = pixel / r->width;
+    if (r->first_hits) {
+        const es_first_hit* first = &r->first_hits[pixel];
+        es_ray ray = es_path_ray(&r->rays, (float)x, (float)y);
+        es_path_begin(&r->scene, &ray, &first->hit, r->settings.quantised, start);
+        *direct = es_v3(first->direct[0], first->direct[1], first->direct[2]);
+        return 0;
+    }
+    float u[2];
+    es_path_numbers(seed, 0xffffu, sample, u);
+    es_ray ray = es_path_ray(&r->rays, (float)x + u[0] - 0.5f, (float)y + u[1] - 0.5f);
+    es_hit hit;
+    es_trace_closest(&r->scene, ray, true, &hit);
+    es_path_begin(&r->scene, &ray, &hit, r->settings.quantised, start);
+    *direct = es_path_direct(&r->scene, start, &rays);
+    return rays + 1;
+}
+
+static void sample_tiles(void* user, uint32_t begin_tile, uint32_t end_tile, uint32_t worker)
 {
     sample_job* job = user;
     es_reference* r = job->r;
-    const size_t plane = value_count(r);
-    const float per_unit = 1.0f / r->unit;
-    es_vec3 bounce[MAX_BOUNCES + 1];
-    for (uint32_t y = begin_row; y < end_row; y++) {
-        uint64_t rays = 0;
-        for (uint32_t x = 0; x < r->width; x++) {
-            uint32_t pixel = y * r->width + x, seed = es_random_u32(r->settings.seed, pixel);
-            es_path_start start;
-            for (uint32_t i = 0; i < job->count; i++) {
-                uint32_t sample = job->first + i;
-                if (r->settings.antialias) {
-                    float u[2];
-                    es_path_numbers(seed, 0xffffu, sample, u);
-                    es_path_begin(&r->scene, &r->rays, (float)x + u[0] - 0.5f, (float)y + u[1] - 0.5f, r->settings.quantised, &start);
-                } else if (!i) {
-                    es_path_begin(&r->scene, &r->rays, (float)x, (float)y, r->settings.quantised, &start);
-                }
-                rays += 1 + es_path_trace(&r->scene, &start, r->bounces, seed, sample, bounce);
-                float total[3] = {start.emission.x, start.emission.y, start.emission.z}, indirect[3] = {0, 0, 0};
-                for (int k = 0; k < 3; k++) add(&r->sums[(size_t)pixel * 3 + k], total[k]);
-                for (uint32_t b = 0; b <= r->bounces; b++) {
-                    const float value[3] = {bounce[b].x, bounce[b].y, bounce[b].z};
-                    for (int k = 0; k < 3; k++) {
-                        size_t at = (size_t)pixel * 3 + k;
-                        add(&r->sums[(b + 1) * plane + at], value[k]);
-                        r->squares[b * plane + at] += (value[k] * per_unit) * (value[k] * per_unit);
-                        total[k] += value[k];
-                        if (b) indirect[k] += value[k];
-                    }
-                }
-                for (int k = 0; k < 3; k++) {
-                    size_t at = (size_t)pixel * 3 + k;
-                    r->squares[(r->bounces + 1) * plane + at] += (indirect[k] * per_unit) * (indirect[k] * per_unit);
-                    r->squares[(r->bounces + 2) * plane + at] += (total[k] * per_unit) * (total[k] * per_unit);
-                }
+    const uint32_t side = r->settings.share;
+    const es_path_job path = {&r->scene, &r->emissions, r->bounces, r->techniques};
+    tile_pixels tile;
+    uint64_t rays = 0;
+    for (uint32_t t = begin_tile; t < end_tile; t++) {
+        /* the first tiles may begin before the film's edge */
+        const uint32_t right = (t % job->across + 1) * side - job->left, bottom = (t / job->across + 1) * side - job->top;
+        es_path_group group = {.seed = es_random_u32(r->settings.seed ^ 0x2545f491u, t), .light_vertices = side * side < 32 ? 1 : side * side / 16, .bounce = tile.bounce};
+        for (uint32_t y = bottom < side ? 0 : bottom - side; y < bottom && y < r->height; y++)
+            for (uint32_t x = right < side ? 0 : right - side; x < right && x < r->width; x++) {
+                tile.pixel[group.count] = y * r->width + x;
+                group.seeds[group.count] = es_random_u32(r->settings.seed, y * r->width + x);
+                group.starts[group.count] = &tile.starts[group.count];
+                group.count++;
             }
+        for (uint32_t i = 0; i < job->count; i++) {
+            for (uint32_t k = 0; k < group.count && (!i || !r->first_hits); k++)
+                rays += begin_path(r, tile.pixel[k], group.seeds[k], job->first + i, &tile.starts[k], &tile.direct[k]);
+            rays += es_path_trace(&path, &group, job->first + i);
+            for (uint32_t k = 0; k < group.count; k++) add_sample(r, tile.pixel[k], tile.starts[k].emission, tile.direct[k], tile.bounce + k * (r->bounces + 1));
         }
-        r->row_rays[y] = rays;
+    }
+    __atomic_fetch_add(&job->rays, rays, __ATOMIC_RELAXED);
+}
+
+static void add_samples(es_reference* r, uint32_t samples)
+{
+    if (r->first_hits && !r->looked) {
+        look_job job = {r, 0};
+        es_parallel_for(r->context, r->height, 4, look, &job);
+        r->stats.rays += job.rays;
+        r->looked = true;
+    }
+    const uint32_t side = r->settings.share;
+    for (uint32_t count; samples; samples -= count) {
+        uint32_t first = (uint32_t)r->stats.samples, tiling = first / SAMPLES_OF_TILING, left = (tiling + 1) * SAMPLES_OF_TILING - first;
+        count = samples < left ? samples : left;
+        sample_job job = {r, first, count, es_random_u32(r->settings.seed, 2 * tiling) % side, es_random_u32(r->settings.seed, 2 * tiling + 1) % side, 0, 0};
+        job.across = (r->width + job.left + side - 1) / side;
+        es_parallel_for(r->context, job.across * ((r->height + job.top + side - 1) / side), side < 4 ? 256 : 16, sample_tiles, &job);
+        r->stats.rays += job.rays;
+        r->stats.samples += count;
     }
 }
 
@@ -279,13 +370,10 @@ es_result es_reference_add(es_reference* r, uint32_t samples)
         return es_misuse(r->context, ES_WRONG_STATE, "the world has changed since es_reference_begin; begin again");
     if (r->stats.done || !samples) return ES_OK;
     if (r->settings.max_samples && samples > r->settings.max_samples - r->stats.samples) samples = (uint32_t)(r->settings.max_samples - r->stats.samples);
-    if (r->stats.samples + samples > 0xffffffffu) return es_fail(r->context, ES_WRONG_STATE, "2^32 samples per pixel are the most there can be");
+    if (r->stats.samples + samples > MAX_SAMPLES) return es_fail(r->context, ES_WRONG_STATE, "2^26 samples per pixel are the most there can be");
     double start = es_seconds();
     es_fp_environment environment = es_fp_enter();
-    sample_job job = {r, (uint32_t)r->stats.samples, samples};
-    es_parallel_for(r->context, r->height, 4, sample_rows, &job);
-    r->stats.samples += samples;
-    for (uint32_t y = 0; y < r->height; y++) r->stats.rays += r->row_rays[y];
+    add_samples(r, samples);
     r->stats.seconds += es_seconds() - start;
     es_reference_estimate(r);
     es_fp_leave(environment);

@@ -8,11 +8,16 @@
  * into a file as they are. */
 typedef struct es_film_sum { float sum, lost; } es_film_sum;
 
+/* What all samples of a pixel through its centre share. */
+typedef struct es_first_hit { es_hit hit; float direct[3]; } es_first_hit;
+
 /* Images: 0 emission, 1 direct, 2 … bounces + 1 the bounces; squares: the same without emission, then indirect, then radiance. */
 struct es_reference {
     es_context* context;
     es_reference_settings settings;
     es_trace_scene scene;
+    es_light_emissions emissions;
+    es_path_techniques techniques;     /* for tests */
     es_world* world;
     es_world_revisions revisions;
     es_raster_view view;
@@ -21,7 +26,8 @@ struct es_reference {
     es_film_sum* sums;                 /* [image][pixel][3] */
     float* squares;                    /* [image][pixel][3], of values over `unit` */
     float unit;                        /* of radiance, a power of two */
-    uint64_t* row_rays;                /* per row of pixels, of the last call */
+    es_first_hit* first_hits;          /* per pixel, while antialias is off: filled before the first sample */
+    bool looked;
     uint64_t fingerprint;
     es_reference_stats stats;
     uint64_t resumed_samples;

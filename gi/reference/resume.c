@@ -180,7 +180,7 @@ static es_result take(es_reference* r, const es_image* file, const char* path)
         return es_fail(r->context, ES_FILE_UNSUPPORTED, "'%s' cannot be resumed: it has no sums; a file written as a reference is expected", path);
     if (fingerprint != r->fingerprint || file->width != r->width || file->height != r->height)
         return es_fail(r->context, ES_FILE_UNSUPPORTED,
-            "'%s' cannot be resumed: it was made of another world, camera or settings (size, bounces, seed, antialias, emission, quantised)", path);
+            "'%s' cannot be resumed: it was made of another world, camera or settings (size, bounces, seed, antialias, emission, quantised, share)", path);
     const char* wrong = visit_state(r, file, samples, false);
     if (wrong) return es_fail(r->context, ES_FILE_DAMAGED, "'%s' cannot be resumed: %s", path, wrong);
     es_reference_forget(r);
