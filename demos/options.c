@@ -25,9 +25,10 @@ bool demo_parse_double(const char* text, double minimum, double maximum, double*
     return true;
 }
 
-static const char* const method_names[] = {"none", "ism", "classic", "vpl-traced"};
+static const char* const method_names[] = {"none", "ism", "classic", "vpl-traced", "vpl-sampled"};
+enum { METHODS = sizeof method_names / sizeof method_names[0] };
 
-const char* demo_method_name(uint32_t method) { return method < 4 ? method_names[method] : "?"; }
+const char* demo_method_name(uint32_t method) { return method < METHODS ? method_names[method] : "?"; }
 
 int demo_parse_size(const char* text, uint32_t* out_width, uint32_t* out_height)
 {
@@ -75,12 +76,12 @@ static int parse_isa(const char* text, demo_options* options)
 
 static int parse_method(const char* text, demo_options* options)
 {
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < METHODS; i++)
         if (!strcmp(text, method_names[i])) {
             options->method = i;
             return DEMO_OK;
         }
-    return demo_refuse("--gi %s: none, ism, classic or vpl-traced is expected", text);
+    return demo_refuse("--gi %s: none, ism, classic, vpl-traced or vpl-sampled is expected", text);
 }
 
 enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };

@@ -54,8 +54,7 @@ static bool sample_direction(const pixel* p, const float u[3], float choice, es_
     return *density > 0.0f;
 }
 
-/* What arrives from one lamp: direction towards it, W/m² on a surface that faces it. False when nothing does. */
-static bool light_at(const es_trace_scene* scene, const es_light_state* light, const es_trace_surface* s, es_vec3* direction, float* strength)
+bool es_lamp_reaches(const es_trace_scene* scene, const es_light_state* light, const es_trace_surface* s, es_vec3* direction, float* strength)
 {
     es_ray ray = {.max = 3e38f};
     *strength = 1.0f;
@@ -131,7 +130,7 @@ static es_vec3 sample_pixel(const compensation_loop* loop, const pixel* p, uint3
         const es_light_state* light = &scene->lights[i];
         es_vec3 from_lamp;
         float strength;
-        if (!light_at(scene, light, &hit, &from_lamp, &strength)) continue;
+        if (!es_lamp_reaches(scene, light, &hit, &from_lamp, &strength)) continue;
         es_vec3 reflected = es_v3_scale(difference(loop, i, p, &hit, wi, distance, from_lamp), strength / density);
         sum = es_v3_add(sum, es_v3_mul(reflected, es_v3(light->radiant[0], light->radiant[1], light->radiant[2])));
     }

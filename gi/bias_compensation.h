@@ -36,6 +36,9 @@ typedef struct es_compensation_job {
     float* result[3];              /* reflected radiance, W/(m² sr), of either sign; rows of gbuffer->stride */
 } es_compensation_job;
 
+/* What arrives from one lamp: direction towards it, W/m² on a surface that faces it. False when nothing does. */
+bool es_lamp_reaches(const es_trace_scene* scene, const es_light_state* light, const es_trace_surface* surface, es_vec3* direction, float* strength);
+
 es_result es_compensate_bias(es_context* context, es_arena* arena, const es_compensation_job* job);
 
 #endif

@@ -18,7 +18,8 @@ typedef enum es_gi_method {
     ES_GI_NONE,     /* direct light only */
     ES_GI_ISM,      /* virtual point lights, imperfect shadow maps (Ritschel thesis §5.2) */
     ES_GI_CLASSIC,  /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
-    ES_GI_VPL_TRACED /* the same lights, visibility by rays, every light at every pixel unless traced_interleave: a judge; slower */
+    ES_GI_VPL_TRACED, /* the same lights, visibility by rays, every light at every pixel unless traced_interleave: a judge; slower */
+    ES_GI_VPL_SAMPLED /* the same lights, interleaved; of its share of them each pixel chooses one by what it would send and tests it by a ray */
 } es_gi_method;
 
 /* What the methods with virtual point lights make of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
@@ -45,6 +46,8 @@ typedef struct es_renderer_settings {
     uint32_t light_size;             /* texels of the light G-buffer's side, a power of two */
     uint32_t seed;                   /* of the sample sets */
     float geometry_bound;            /* cos cos / d² of a pair is cut off here, d as a share of the scene's extent (Knecht eq. 4.7 with 1/bound = d²min) */
+    float near_distance;             /* share of the scene's extent: what lights nearer than this would send too much of is found by a ray per pixel, in
+                                      * place of geometry_bound and spread, which then do not apply; 0: by the lights alone, as far as those let it; with traced_bias BOUNDED */
     float spread;                    /* how far a light's own area softens it close by: 0 a point, 1 a disc of that area */
     bool view_importance;            /* more lights where they matter for what the camera sees */
     float lobe_roughness;            /* lobes sharper than this GGX roughness are widened to it under virtual point lights */
@@ -69,6 +72,7 @@ typedef struct es_renderer_settings {
     uint32_t filter_passes;          /* 0: none; 1: a box, in which single bright pixels leave n × n blocks; 2: a tent, which is smooth */
     float filter_depth;              /* largest relative depth difference (Knecht: 0.01) */
     float filter_normal;             /* smallest dot product of normals (Knecht: 0.8) */
+    bool half_resolution;            /* indirect light is shaded and filtered for one pixel of 2 × 2, and interpolated along surfaces for the others */
     /* display */
     uint32_t tone_map;               /* es_tone_map */
     float exposure;                  /* stops */

@@ -104,24 +104,52 @@ static void put_channel(const es_gbuffer* g, image_kind kind, es_image* image)
 
 /* ---- from the composing kernel, with other outputs --------------------------------------------------------------------------- */
 
+/* Planes at half the resolution, each value over its 2 × 2 pixels. */
+static es_result repeat_planes(es_renderer* renderer, const es_planes* half, es_planes* whole)
+{
+    es_result result = es_planes_resize(renderer->context, whole, &renderer->gbuffer);
+    if (result) return result;
+    const es_gbuffer* g = &renderer->gbuffer;
+    for (int k = 0; k < 3; k++)
+        for (uint32_t y = 0; y < g->height; y++)
+            for (uint32_t x = 0; x < g->stride; x++)
+                whole->at[k][(size_t)y * g->stride + x] = x < g->width ? half->at[k][(size_t)(y / 2) * renderer->half.stride + x / 2] : 0.0f;
+    return ES_OK;
+}
+
 static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* image)
 {
     es_planes planes = {0};
     es_result result = es_planes_resize(renderer->context, &planes, &renderer->gbuffer);
     if (result) return result;
     es_compose_job job = es_renderer_compose_job(renderer);
+    es_planes irradiance = {0}, specular = {0};
+    if (kind == IMAGE_INDIRECT_UNFILTERED && renderer->plan.valid[ES_PASS_UPSAMPLE]) {
+        result = repeat_planes(renderer, &renderer->irradiance, &irradiance);
+        if (!result && renderer->has_specular) result = repeat_planes(renderer, &renderer->specular, &specular);
+        if (result) {
+            es_planes_free(renderer->context, &planes);
+            es_planes_free(renderer->context, &irradiance);
+            return result;
+        }
+    } else {
+        irradiance = renderer->irradiance;
+        specular = renderer->specular;
+    }
     float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : job.indirect;
     for (int k = 0; k < 3; k++) {
         target[k] = planes.at[k];
         if (kind == IMAGE_INDIRECT_UNFILTERED) {
-            if (job.irradiance[k]) job.irradiance[k] = renderer->irradiance.at[k];
-            if (job.specular[k]) job.specular[k] = renderer->specular.at[k];
+            if (job.irradiance[k]) job.irradiance[k] = irradiance.at[k];
+            if (job.specular[k]) job.specular[k] = specular.at[k];
         }
     }
     es_compose(renderer->context, &job);
     const float* const from[3] = {planes.at[0], planes.at[1], planes.at[2]};
     put_planes(from, renderer->gbuffer.stride, image);
     es_planes_free(renderer->context, &planes);
+    if (irradiance.memory != renderer->irradiance.memory) es_planes_free(renderer->context, &irradiance);
+    if (specular.memory != renderer->specular.memory) es_planes_free(renderer->context, &specular);
     return ES_OK;
 }
 

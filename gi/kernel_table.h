@@ -7,6 +7,7 @@
 #include "gi/error/flip.h"
 #include "gi/filter.h"
 #include "gi/gi.h"
+#include "gi/half_resolution.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
 #include "gi/shade.h"
@@ -21,6 +22,8 @@
     /* rows [row_begin, row_end) */                                                                              \
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    /* a smaller image to the whole one's rows [row_begin, row_end) */                                         \
+    X(upsample, (const es_upsample_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \

@@ -21,6 +21,7 @@
     X(SHADING, "shading", "samples")                                                                             \
     X(COMPENSATION, "bias compensation", "samples")                                                              \
     X(FILTER, "filter", "pixels")                                                                                \
+    X(UPSAMPLE, "upsample", "pixels")                                                                            \
     X(COMPOSE, "compose", "pixels")
 
 typedef enum es_pass {

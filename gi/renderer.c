@@ -5,6 +5,7 @@
 
 #include "gi/classic.h"
 #include "gi/direct.h"
+#include "gi/near_light.h"
 #include "gi/surface.h"
 #include "gi/vpl_visibility.h"
 #include "platform/context.h"
@@ -77,6 +78,9 @@ static void free_frame_buffers(es_renderer* renderer)
     if (renderer->display) es_release(context, renderer->display, (size_t)renderer->gbuffer.width * renderer->gbuffer.height * sizeof(uint32_t));
     renderer->display = NULL;
     es_gbuffer_destroy(context, &renderer->gbuffer);
+    es_gbuffer_destroy(context, &renderer->half);
+    es_planes_free(context, &renderer->upsampled_irradiance);
+    es_planes_free(context, &renderer->upsampled_specular);
     es_planes_free(context, &renderer->direct);
     es_planes_free(context, &renderer->irradiance);
     es_planes_free(context, &renderer->specular);
@@ -329,7 +333,7 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
         es_plan_not_needed(plan, ES_PASS_ISM, why);
     }
     if (none || s->method != ES_GI_CLASSIC) es_plan_not_needed(plan, ES_PASS_CLASSIC, none ? none : "gi is not classic");
-    if (none || s->method == ES_GI_VPL_TRACED) return ES_OK;
+    if (none || s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED) return ES_OK;
 
     if (s->method == ES_GI_CLASSIC) {
         es_plan_begin(plan, ES_PASS_CLASSIC);
@@ -393,6 +397,9 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
 /* 1/m², in place of the bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
 #define UNBOUNDED 1e18f
 
+/* What the indirect light is shaded and filtered on. */
+static const es_gbuffer* shaded_gbuffer(const es_renderer* r) { return r->settings.half_resolution ? &r->half : &r->gbuffer; }
+
 /* At every pixel, whatever the setting of the pattern. */
 static bool every_light(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED && !s->traced_interleave; }
 
@@ -411,15 +418,18 @@ static es_result pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_ISM);
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
     es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
-    const bool traced = s->method == ES_GI_VPL_TRACED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
+    const bool sampled = s->method == ES_GI_VPL_SAMPLED, traced = sampled || s->method == ES_GI_VPL_TRACED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
+    const float near = s->traced_bias == ES_TRACED_BOUNDED ? s->near_distance * in->extent : 0.0f;
     const uint32_t interleave = every_light(s) ? 1 : s->interleave;
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded};
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near, (float)s->seed};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
-    es_result result = es_planes_resize(r->context, &r->irradiance, &r->gbuffer);
-    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, &r->gbuffer);
+    const es_gbuffer* shaded = shaded_gbuffer(r);
+    es_result result = s->half_resolution ? es_gbuffer_halve(r->context, &r->gbuffer, &r->half) : ES_OK;
+    if (!result) result = es_planes_resize(r->context, &r->irradiance, shaded);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, shaded);
     if (result) return result;
-    es_shade_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
+    es_shade_job job = {.gbuffer = shaded, .rays = s->half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
         .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = es_geometry_bound(s, in), .interleave = interleave};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = r->irradiance.at[k];
@@ -432,12 +442,19 @@ static es_result pass_shading(es_renderer* r, const es_frame_inputs* in)
         job.visibility = &visibility.shade;
         job.maps = NULL;
     }
+    es_near_light near_light;
+    if (near > 0.0f) {
+        near_light = es_near_light_of(&r->trace_scene, near, in->extent * ES_RAY_OFFSET_SHARE);
+        job.near = &near_light.shade;
+        job.geometry_bound = 1.0f / (near * near);
+        job.spread = 0.0f;
+    }
     if (unbounded) {
         job.geometry_bound = UNBOUNDED;
         job.spread = job.lobe_roughness = 0.0f;
     }
     if (!result) result = es_shade(r->context, &r->arena, &job);
-    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->vpl_count / (interleave * interleave));
+    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)shaded->width * shaded->height * r->vpl_count / (interleave * interleave));
     return result;
 }
 
@@ -457,14 +474,15 @@ static es_result pass_filter(es_renderer* r, const es_frame_inputs* in)
     float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
+    const es_gbuffer* shaded = shaded_gbuffer(r);
     es_result result = ES_OK;
     for (uint32_t i = 0; i < 2 && i < s->filter_passes && !result; i++) {
-        result = es_planes_resize(r->context, &r->filtered_irradiance[i], &r->gbuffer);
-        if (!result && r->has_specular) result = es_planes_resize(r->context, &r->filtered_specular[i], &r->gbuffer);
+        result = es_planes_resize(r->context, &r->filtered_irradiance[i], shaded);
+        if (!result && r->has_specular) result = es_planes_resize(r->context, &r->filtered_specular[i], shaded);
     }
     const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
     for (uint32_t pass = 0; pass < s->filter_passes && !result; pass++) {
-        es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+        es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
         for (int k = 0; k < 3; k++) {
             job.source[k] = irradiance->at[k];
             job.result[k] = r->filtered_irradiance[pass % 2].at[k];
@@ -476,16 +494,51 @@ static es_result pass_filter(es_renderer* r, const es_frame_inputs* in)
         es_arena_reset(&r->arena);
         result = es_filter_geometry_aware(r->context, &r->arena, &job);
     }
-    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)r->gbuffer.width * r->gbuffer.height * s->filter_passes);
+    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)shaded->width * shaded->height * s->filter_passes);
     return result;
+}
+
+static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : &r->irradiance; }
+static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : &r->specular; }
+
+static es_result pass_upsample(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->half_resolution ? "half-resolution is off" : NULL;
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_UPSAMPLE, why);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_UPSAMPLE);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_plan_reads_pass(plan, ES_PASS_FILTER);
+    float numbers[] = {s->filter_depth, s->filter_normal, r->has_specular};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_UPSAMPLE)) return ES_OK;
+    es_result result = es_planes_resize(r->context, &r->upsampled_irradiance, &r->gbuffer);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->upsampled_specular, &r->gbuffer);
+    if (result) return result;
+    es_upsample_job job = {.gbuffer = &r->gbuffer, .half = &r->half, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = filtered_irradiance(r)->at[k];
+        job.result[k] = r->upsampled_irradiance.at[k];
+        job.source[k + 3] = filtered_specular(r)->at[k];
+        job.result[k + 3] = r->upsampled_specular.at[k];
+    }
+    es_upsample(r->context, &job);
+    es_plan_done(plan, ES_PASS_UPSAMPLE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+    return ES_OK;
 }
 
 es_compose_job es_renderer_compose_job(const es_renderer* r)
 {
     const es_renderer_settings* s = &r->settings;
     es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure), .white = s->white, .tone_map = s->tone_map};
-    const es_planes* irradiance = r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : &r->irradiance;
-    const es_planes* specular = r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : &r->specular;
+    const bool half = r->plan.valid[ES_PASS_UPSAMPLE];
+    const es_planes* irradiance = half ? &r->upsampled_irradiance : filtered_irradiance(r);
+    const es_planes* specular = half ? &r->upsampled_specular : filtered_specular(r);
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];
@@ -504,6 +557,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -545,6 +599,7 @@ static es_result render(es_renderer* r, es_world* world)
     if (!result) result = pass_shading(r, &in);
     if (!result) result = es_pass_compensation(r, &in);
     if (!result) result = pass_filter(r, &in);
+    if (!result) result = pass_upsample(r, &in);
     if (!result) pass_compose(r);
     return result;
 }

@@ -4,6 +4,7 @@
 
 #include "gi/compose.h"
 #include "gi/filter.h"
+#include "gi/half_resolution.h"
 #include "gi/ism.h"
 #include "gi/light_view.h"
 #include "gi/plan.h"
@@ -44,6 +45,8 @@ struct es_renderer {
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance[2]; /* two to go back and forth between */
     es_planes specular, filtered_specular[2];     /* used when something in the frame has a lobe */
+    es_gbuffer half;           /* with half_resolution: what the indirect light is shaded and filtered on, and its planes */
+    es_planes upsampled_irradiance, upsampled_specular;
     es_planes compensation;    /* of the lights' bias: reflected radiance, of either sign */
     bool has_specular;
     uint32_t filter_passes;    /* that this frame's indirect light went through */

@@ -7,7 +7,7 @@
 static const es_setting renderer_table[] = {
     {"width", ES_SETTING_INT, "1024", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(width)},
     {"height", ES_SETTING_INT, "768", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(height)},
-    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic|vpl-traced", "indirect light: none, imperfect shadow maps, an accurate map per light, or rays to every light", AT(method)},
+    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic|vpl-traced|vpl-sampled", "indirect light: none, imperfect shadow maps, an accurate map per light, rays to every light, or to one a pixel", AT(method)},
     {"skip", ES_SETTING_BOOL, "true", 0, 1, NULL, "skip work whose result would be the same bits", AT(skip)},
     {"bounces", ES_SETTING_INT, "1", 0, 1, NULL, "indirect bounces", AT(bounces)},
 
@@ -21,6 +21,8 @@ static const es_setting renderer_table[] = {
     {"vpl.seed", ES_SETTING_INT, "0", 0, 1000000, NULL, "offset into the Halton sequence", AT(seed)},
     {"vpl.bound", ES_SETTING_FLOAT, "16000", 0.01, 1e9, NULL, "largest geometry term cos cos / d², d as a share of the scene's extent", AT(geometry_bound)},
     {"vpl.spread", ES_SETTING_FLOAT, "2", 0, 100, NULL, "how far a light's own area softens it close by: 0 a point, 1 a disc", AT(spread)},
+    {"vpl.near", ES_SETTING_FLOAT, "0", 0, 1, NULL,
+        "nearer light is found by a ray per pixel, share of the scene's extent, in place of vpl.bound and vpl.spread; 0: none is", AT(near_distance)},
     {"vpl.view-importance", ES_SETTING_BOOL, "true", 0, 1, NULL, "more lights where they matter for what the camera sees", AT(view_importance)},
     {"vpl.roughness", ES_SETTING_FLOAT, "0.5", 0, 1, NULL, "lobes sharper than this are widened to it, or each light would show as a spot", AT(lobe_roughness)},
     {"vpl.glossy", ES_SETTING_BOOL, "true", 0, 1, NULL, "virtual point lights emit their surface's glossy lobe too", AT(glossy_vpls)},
@@ -45,6 +47,7 @@ static const es_setting renderer_table[] = {
     {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent", AT(filter_passes)},
     {"filter.depth", ES_SETTING_FLOAT, "0.03", 0, 1, NULL, "largest relative depth difference the filter crosses", AT(filter_depth)},
     {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
+    {"half-resolution", ES_SETTING_BOOL, "false", 0, 1, NULL, "indirect light for one pixel of 2 × 2; the others are interpolated along their surface", AT(half_resolution)},
 
     {"tone-map", ES_SETTING_CHOICE, "reinhard", 0, 0, "reinhard|pbr-neutral|linear", "display transform", AT(tone_map)},
     {"white", ES_SETTING_FLOAT, "4", 0.01, 100000, NULL, "Reinhard: radiance times exposure that is shown as white", AT(white)},

@@ -4,6 +4,7 @@
  * one after another: its G-buffer lines serve all of them. */
 #include "gi/shade.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 #include "gi/kernel_table.h"
@@ -68,13 +69,79 @@ static es_shade_light light_of(const es_vpl_record* vpl, float scale, float spre
     return light;
 }
 
+/* ---- sampled: the order of a phase's lights ----------------------------------------------------------------------------- */
+
+typedef struct placed_light { uint32_t place, record; } placed_light;
+
+static uint32_t spread_bits(uint32_t a)
+{
+    a = (a | a << 16) & 0x030000ffu;
+    a = (a | a << 8) & 0x0300f00fu;
+    a = (a | a << 4) & 0x030c30c3u;
+    return (a | a << 2) & 0x09249249u;
+}
+
+static int by_place(const void* a, const void* b)
+{
+    const placed_light *p = a, *q = b;
+    if (p->place != q->place) return p->place < q->place ? -1 : 1;
+    return p->record < q->record ? -1 : p->record > q->record;
+}
+
+/* Along a Morton curve through the box of all lights, phase by phase. */
+static void order_lights(const es_shade_job* job, placed_light* order, uint32_t step)
+{
+    float low[3], scale[3];
+    for (int k = 0; k < 3; k++) {
+        float high = low[k] = job->vpls[0].position[k];
+        for (uint32_t v = 1; v < job->vpl_count; v++) {
+            low[k] = es_minf(low[k], job->vpls[v].position[k]);
+            high = es_maxf(high, job->vpls[v].position[k]);
+        }
+        scale[k] = high > low[k] ? 1023.0f / (high - low[k]) : 0.0f;
+    }
+    uint32_t at = 0;
+    for (uint32_t phase = 0; phase < step; phase++) {
+        uint32_t first = at;
+        for (uint32_t v = phase; v < job->vpl_count; v += step) {
+            uint32_t place = 0;
+            for (int k = 0; k < 3; k++) place |= spread_bits((uint32_t)es_clampf((job->vpls[v].position[k] - low[k]) * scale[k], 0.0f, 1023.0f)) << k;
+            order[at++] = (placed_light){place, v};
+        }
+        qsort(order + first, at - first, sizeof *order, by_place);
+    }
+}
+
+static es_result place_lights(es_context* context, es_arena* arena, const es_shade_job* job, es_shade_light* lights)
+{
+    const uint32_t step = job->interleave * job->interleave;
+    placed_light* order = es_arena_allocate(arena, ((size_t)job->vpl_count + 1) * sizeof *order);
+    if (!order) return es_context_last_result(context);
+    if (job->vpl_count) order_lights(job, order, step);
+    uint32_t at = 0;
+    for (uint32_t phase = 0; phase < step; phase++)
+        for (uint32_t v = phase; v < job->vpl_count; v += step, at++) {
+            es_shade_light* light = &lights[v];
+            *light = light_of(&job->vpls[order[at].record], (float)step, job->spread, job->lobe_roughness);
+            light->record = order[at].record;
+            light->weight = 0.2126f * light->color[0] + 0.7152f * light->color[1] + 0.0722f * light->color[2];
+            if (light->glossy)
+                light->weight += 0.318309886f * (0.2126f * light->power[0] * light->specular_color[0] + 0.7152f * light->power[1] * light->specular_color[1] + 0.0722f * light->power[2] * light->specular_color[2]);
+        }
+    return ES_OK;
+}
+
 es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job)
 {
     const uint32_t n = job->interleave, width = job->gbuffer->width, height = job->gbuffer->height;
     es_shade_light* lights = es_arena_allocate(arena, ((size_t)job->vpl_count + 1) * sizeof *lights);
     es_shade_batch* batches = lights ? es_arena_allocate(arena, (size_t)es_context_workers(context) * sizeof *batches) : NULL;
     if (!batches) return es_context_last_result(context);
-    for (uint32_t v = 0; v < job->vpl_count; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread, job->lobe_roughness);
+    if (job->sampled) {
+        es_result result = place_lights(context, arena, job, lights);
+        if (result) return result;
+    }
+    for (uint32_t v = 0; v < job->vpl_count && !job->sampled; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread, job->lobe_roughness);
 
     shade_loop loop = {.job = job, .lights = lights, .batches = batches, .kernels = es_gi_kernel_table(es_context_isa(context))};
     uint32_t columns = (width + n - 1) / n, rows = (height + n - 1) / n;

@@ -13,6 +13,13 @@
  * depths within it differ by width · tan a, which slope_bias allows for.
  *     irradiance += n² · flux / pi · G · V
  *
+ * Sampled: of the lights of its phase each pixel takes one, l with probability w_l / W, w_l being what l would send if nothing stood between
+ * (G · luminance) and W the sum over the phase, and only its shadow is found:
+ *     irradiance += W / luminance · n² · flux / pi · V,
+ * which is the sum over the phase on average, and the sum itself where all lights are seen and of one colour. The lights of a phase are put in
+ * order along a curve through space, and the numbers that choose are spread evenly over each neighbourhood of pixels, so that it
+ * takes its lights from everywhere.
+ *
  * The pixel's own diffuse reflectance, albedo · (1 - metallic) / pi, is applied after the filter. Lobes (gi/surface.h): a glossy light
  * sends power · f(incident, d) instead of flux / pi; a pixel with a lobe has a second sum, the radiance its lobe reflects to the
  * eye, and its irradiance is what passes to the diffuse part.
@@ -34,7 +41,17 @@ typedef struct es_shade_visibility es_shade_visibility;
  * and their own face; others are not looked at. Called by several workers at once. */
 struct es_shade_visibility {
     void (*test)(const es_shade_visibility* visibility, uint32_t vpl, es_shade_batch* batch, uint32_t lanes);
+    /* the same for sampled lights: pixel i and record batch->chosen[i], which is negative where there is nothing to test */
+    void (*test_chosen)(const es_shade_visibility* visibility, es_shade_batch* batch, uint32_t lanes);
     float offset;                  /* metres from a pixel's surface at which its rays begin, besides 2^-17 of its largest coordinate */
+};
+
+/* Light that is not from the lights of the set: `add` adds it to the batch's sums, those of lobes included where `lobes`. Pixel i of the batch may
+ * use the numbers batch->direction[0 … 1][i]. Called by several workers at once. */
+typedef struct es_shade_near es_shade_near;
+struct es_shade_near {
+    void (*add)(const es_shade_near* near, es_shade_batch* batch, uint32_t lanes, bool lobes);
+    float offset;                  /* as in es_shade_visibility */
 };
 
 typedef struct es_shade_job {
@@ -51,6 +68,9 @@ typedef struct es_shade_job {
     float geometry_bound;          /* 1/m² */
     float lobe_roughness;          /* lobes of lights and pixels are at least as wide as GGX of this roughness */
     uint32_t interleave;           /* n, 1 … ES_INTERLEAVE_MAX */
+    bool sampled;                  /* with visibility: one light of its phase for each pixel */
+    const es_shade_near* near;     /* NULL: none */
+    uint32_t seed;                 /* of what is random with sampled and near */
     /* out, rows of gbuffer->stride; 0 where nothing is seen */
     float* irradiance[3];
     float* specular[3];            /* NULL: pixels have no lobes */
@@ -71,6 +91,9 @@ typedef struct es_shade_light {
     float incident[3], specular_color[3], roughness;
     uint32_t model;
     bool glossy;
+    /* sampled */
+    float weight;                  /* luminance of what the light sends */
+    uint32_t record;               /* place among es_shade_job.vpls: lights of a phase are in another order */
 } es_shade_light;
 
 /* Pixels of one phase inside a block of the image: so many that a light's map comes from memory few times a frame, so few that they
@@ -87,9 +110,15 @@ struct es_shade_batch {
     int32_t model[ES_SHADE_LANES];
     uint8_t lobed[ES_SHADE_LANES / 8];  /* per vector: does a pixel of it have a lobe? */
     float s[3][ES_SHADE_LANES];
-    /* with es_shade_visibility */
+    /* with es_shade_visibility or es_shade_near */
     float ox[ES_SHADE_LANES], oy[ES_SHADE_LANES], oz[ES_SHADE_LANES]; /* where rays begin */
     int32_t visible[ES_SHADE_LANES];
+    float direction[2][ES_SHADE_LANES]; /* [0, 1) */
+    /* sampled */
+    float choice[ES_SHADE_LANES];      /* [0, 1) */
+    int32_t light[ES_SHADE_LANES];     /* the chosen one, -1: none sends anything */
+    int32_t chosen[ES_SHADE_LANES];    /* its record, or -1 */
+    float share[ES_SHADE_LANES];       /* W / luminance */
 };
 
 /* A block: columns [column, column + ES_SHADE_COLUMNS) and rows [row, row + rows) of each phase of phase row phase_y. */

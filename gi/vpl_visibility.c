@@ -32,13 +32,13 @@ static es_vec3 end_of(const es_trace_scene* scene, const es_vpl_record* vpl, flo
     return es_offset_origin(es_v3_add(position, es_v3_scale(normal, extent * ES_RAY_OFFSET_SHARE)), normal);
 }
 
-static void test_run(const es_trace_scene* scene, const es_ray* rays, const uint32_t* lanes, uint32_t count, int32_t* visible)
+static void test_run(const es_trace_scene* scene, es_ray_kind kind, const es_ray* rays, const uint32_t* lanes, uint32_t count, int32_t* visible)
 {
     uint8_t blocked[RUN];
     if (scene->has_masks)
         for (uint32_t i = 0; i < count; i++) blocked[i] = es_trace_blocked(scene, rays[i]);
     else
-        es_bvh_any(scene->bvh, ES_RAYS_COHERENT, rays, count, blocked);
+        es_bvh_any(scene->bvh, kind, rays, count, blocked);
     for (uint32_t i = 0; i < count; i++) visible[lanes[i]] = blocked[i] ? 0 : -1;
 }
 
@@ -58,10 +58,29 @@ static void test(const es_shade_visibility* shade, uint32_t vpl, es_shade_batch*
         rays[count] = (es_ray){{end.x, end.y, end.z}, 0.0f, {b->ox[i] - end.x, b->oy[i] - end.y, b->oz[i] - end.z}, 1.0f};
         places[count++] = i;
         if (count < RUN) continue;
-        test_run(visibility->scene, rays, places, count, b->visible);
+        test_run(visibility->scene, ES_RAYS_COHERENT, rays, places, count, b->visible);
         count = 0;
     }
-    test_run(visibility->scene, rays, places, count, b->visible);
+    test_run(visibility->scene, ES_RAYS_COHERENT, rays, places, count, b->visible);
+}
+
+static void test_chosen(const es_shade_visibility* shade, es_shade_batch* b, uint32_t lanes)
+{
+    const es_vpl_visibility* visibility = (const es_vpl_visibility*)shade;
+    es_ray rays[RUN];
+    uint32_t places[RUN], count = 0;
+    for (uint32_t i = 0; i < lanes; i++) {
+        b->visible[i] = 0;
+        if (b->chosen[i] < 0) continue;
+        const es_vec3 end = visibility->ends[b->chosen[i]];
+        /* from the pixel: those of a batch lie closer together than their lights */
+        rays[count] = (es_ray){{b->ox[i], b->oy[i], b->oz[i]}, 0.0f, {end.x - b->ox[i], end.y - b->oy[i], end.z - b->oz[i]}, 1.0f};
+        places[count++] = i;
+        if (count < RUN) continue;
+        test_run(visibility->scene, ES_RAYS_SINGLE, rays, places, count, b->visible);
+        count = 0;
+    }
+    test_run(visibility->scene, ES_RAYS_SINGLE, rays, places, count, b->visible);
 }
 
 typedef struct ends_job { es_vpl_visibility* visibility; float extent; } ends_job;
@@ -74,7 +93,7 @@ static void find_ends(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 
 es_result es_vpl_visibility_prepare(es_arena* arena, const es_trace_scene* scene, const es_vpl_record* vpls, uint32_t count, float extent, es_vpl_visibility* visibility)
 {
-    *visibility = (es_vpl_visibility){.shade = {test, extent * ES_RAY_OFFSET_SHARE}, .scene = scene, .vpls = vpls};
+    *visibility = (es_vpl_visibility){.shade = {test, test_chosen, extent * ES_RAY_OFFSET_SHARE}, .scene = scene, .vpls = vpls};
     visibility->ends = es_arena_allocate(arena, ((size_t)count + 1) * sizeof *visibility->ends);
     if (!visibility->ends) return es_context_last_result(scene->context);
     ends_job job = {visibility, extent};

@@ -1,4 +1,4 @@
-/* Interleaved shading and the geometry-aware filter: every instruction set against scalar, bit for bit, on random G-buffers of odd
+/* Interleaved shading, the geometry-aware filter and the way up from half the resolution: every instruction set against scalar, bit for bit, on random G-buffers of odd
  * sizes with extreme values, with guards round what is written.
  *
  * check_gi --time prints milliseconds for 1024 x 768 pixels and 1024 lights of every kernel and instruction set instead. */
@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #include "gi/filter.h"
+#include "gi/half_resolution.h"
 #include "gi/kernel_table.h"
 #include "gi/shade.h"
 #include "platform/maths.h"
@@ -216,6 +217,42 @@ static void check_filter(void** state)
     free(scratch);
 }
 
+static void check_upsample(void** state)
+{
+    (void)state;
+    for (uint32_t trial = 0; trial < 64; trial++) {
+        uint32_t width = 1 + random_bits() % 60, height = 1 + random_bits() % 20;
+        es_gbuffer g = new_gbuffer(width, height), half = new_gbuffer((width + 1) / 2, (height + 1) / 2);
+        const size_t count = (size_t)g.stride * height, few = (size_t)half.stride * half.height;
+        es_upsample_job job = {.gbuffer = &g, .half = &half, .depth_threshold = trial % 5 ? 0.05f : 0.0f, .normal_threshold = trial % 7 ? 0.8f : 1.0f, .plane_count = 1 + trial % 6};
+        plane source[6], expected[6], result[6];
+        for (int k = 0; k < 6; k++) {
+            source[k] = new_plane(few);
+            for (size_t i = 0; i < few; i++) at(source[k])[i] = random_bits() % 50 ? uniform(0, 10) : uniform(0, 1e30f);
+            job.source[k] = at(source[k]);
+            expected[k] = new_plane(count);
+            result[k] = new_plane(count);
+        }
+        for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
+            if (!(es_isa_available_mask() >> isa & 1)) continue;
+            plane* to = isa == ES_ISA_SCALAR ? expected : result;
+            for (int k = 0; k < 6; k++) job.result[k] = at(to[k]);
+            es_gi_kernel_table((es_isa)isa)->upsample(&job, 0, height);
+            for (uint32_t k = 0; k < job.plane_count; k++) {
+                check_guards(to[k]);
+                check_equal(&g, expected[k], to[k], "upsampled");
+            }
+        }
+        for (int k = 0; k < 6; k++) {
+            free(source[k].memory);
+            free(expected[k].memory);
+            free(result[k].memory);
+        }
+        free_gbuffer(&g);
+        free_gbuffer(&half);
+    }
+}
+
 static void time_all(void)
 {
     enum { COUNT = 1024, SIZE = 128, REPEAT = 3 };
@@ -262,6 +299,7 @@ int main(int argc, char** argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(check_shade),
         cmocka_unit_test(check_filter),
+        cmocka_unit_test(check_upsample),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -353,6 +353,15 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     check(context, es_renderer_configure(renderer, &settings), "compensating");
     check(context, es_world_step(world, 1.0f / 30), "a step");
     print_images(context, renderer, world, p->name, "compensated", folder);
+    settings.traced_bias = ES_TRACED_BOUNDED;
+    settings.method = ES_GI_VPL_SAMPLED;
+    settings.near_distance = 0.05f;
+    settings.vpls = p->vpls;
+    check(context, es_renderer_configure(renderer, &settings), "sampling");
+    print_images(context, renderer, world, p->name, "sampled", folder);
+    settings.half_resolution = true;
+    check(context, es_renderer_configure(renderer, &settings), "halving the resolution");
+    print_images(context, renderer, world, p->name, "half", folder);
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);

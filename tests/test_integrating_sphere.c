@@ -134,6 +134,28 @@ static void test_vpl_traced(void** state) { bounce(ES_GI_VPL_TRACED, ES_TRACED_B
 static void test_vpl_traced_unbounded(void** state) { bounce(ES_GI_VPL_TRACED, ES_TRACED_UNBOUNDED, false); }
 static void test_vpl_traced_compensated(void** state) { bounce(ES_GI_VPL_TRACED, ES_TRACED_COMPENSATED, false); }
 static void test_view_importance(void** state) { bounce(ES_GI_ISM, 0, true); }
+/* All lights are seen and of one colour: the chosen one stands for its phase exactly. */
+static void test_vpl_sampled(void** state) { bounce(ES_GI_VPL_SAMPLED, 0, false); }
+
+/* With near light from as far as D, more than the diameter, the lights' 1 / 4R² is bounded by 1 / D², and the rays find the same 1 - 4R² / D² of
+ * whatever they hit. */
+static void test_near_light(void** state)
+{
+    small_world w;
+    sphere(&w, &lamps[0], 1, 0.5f, 7);
+    es_renderer_settings s = settings_of(ES_GI_VPL_SAMPLED);
+    s.near_distance = 0.8f; /* D = 0.8 · 2 √3 R */
+    es_renderer* renderer = render(&w, &s);
+    check(renderer, w.context, "indirect", 0.25 * 7 / pi, 2e-3, 0.03);
+    /* the lights' part alone */
+    s.geometry_bound = 1 / (s.near_distance * s.near_distance);
+    s.near_distance = 0;
+    assert_int_equal(es_renderer_configure(renderer, &s), ES_OK);
+    assert_int_equal(es_renderer_render(renderer, w.world), ES_OK);
+    check(renderer, w.context, "indirect", 0.25 * 7 / pi * 4 / (0.64 * 12), 2e-3, 0.03);
+    es_renderer_destroy(renderer);
+    small_world_destroy(&w);
+}
 
 /* A light of area a softened by spread: d² becomes d² + spread a / pi. In the sphere d² is spread evenly over 0 … 4R², so that
  * the mean of d² / (d² + c R²) is 1 - c / 4 ln(1 + 4 / c). */
@@ -204,6 +226,8 @@ int main(void)
         cmocka_unit_test(test_vpl_traced),
         cmocka_unit_test(test_vpl_traced_unbounded),
         cmocka_unit_test(test_vpl_traced_compensated),
+        cmocka_unit_test(test_vpl_sampled),
+        cmocka_unit_test(test_near_light),
         cmocka_unit_test(test_view_importance),
         cmocka_unit_test(test_spread),
         cmocka_unit_test(test_direct),

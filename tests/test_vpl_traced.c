@@ -297,7 +297,7 @@ static void test_compensation_alone(void** state)
     s.traced_bias = ES_TRACED_BOUNDED;
     assert_int_equal(es_renderer_configure(renderer, &s), ES_OK);
     assert_int_equal(es_renderer_render(renderer, w.world), ES_OK);
-    assert_string_equal(pass(renderer, "ray hierarchy")->skipped, "gi is not vpl-traced");
+    assert_string_equal(pass(renderer, "ray hierarchy")->skipped, "nothing is found by rays");
     assert_null(renderer->trace_scene.bvh);
     es_image bounded = picture(renderer, "indirect");
     for (int i = 0; i < PIXELS * 3; i++) bounded.pixels[i] += compensation.pixels[i];
@@ -501,7 +501,7 @@ static void test_skipping(void** state)
     s.method = ES_GI_NONE;
     assert_int_equal(es_renderer_configure(with, &s), ES_OK);
     assert_int_equal(es_renderer_render(with, w.world), ES_OK);
-    assert_string_equal(pass(with, "ray hierarchy")->skipped, "gi is not vpl-traced");
+    assert_string_equal(pass(with, "ray hierarchy")->skipped, "nothing is found by rays");
     assert_null(with->trace_scene.bvh);
     es_renderer_destroy(with);
     es_renderer_destroy(without);

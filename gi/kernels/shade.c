@@ -5,6 +5,8 @@
  * the caches while it passes over the batch. Eight pixels that the light cannot reach (behind it, or facing away) cost nine
  * multiplications and a branch.
  */
+#include <stddef.h>
+
 #include "gi/kernel_table.h"
 #include "gi/kernels/surface_simd.h"
 #include "gi/shade.h"
@@ -25,6 +27,24 @@ static void ray_origins(const uint32_t* geometric_normals, vi x, const vf p[3], 
     vf_store(batch->ox + at, p[0] + step * nx);
     vf_store(batch->oy + at, p[1] + step * ny);
     vf_store(batch->oz + at, p[2] + step * nz);
+}
+
+/* Bits of x and y in turns: pixels of a square block of any power of two follow one another. */
+static vi interleave_zeros(vi a)
+{
+    a = (a | a << 8) & vi_set1(0x00ff00ff);
+    a = (a | a << 4) & vi_set1(0x0f0f0f0f);
+    a = (a | a << 2) & vi_set1(0x33333333);
+    return (a | a << 1) & vi_set1(0x55555555);
+}
+static vi morton(vi x, uint32_t y) { return interleave_zeros(x) | interleave_zeros(vi_set1((int32_t)y)) << 1; }
+
+/* Fractions of multiples of 2^32 / step, for steps that are powers of one number (Roberts 2018): together they fill the cube evenly, and so
+ * does any run of them. The seed shifts them. */
+static vf spread_number(const es_shade_job* job, vi index, uint32_t shift, uint32_t step)
+{
+    vu bits = (vu)index * (vu)vi_set1((int32_t)step) + (vu)vi_set1((int32_t)((job->seed + 1u) * shift)); /* modulo 2^32 */
+    return vf_from_int(vi_shift_right_logical((vi)bits, 8)) * vf_set1(1.0f / 16777216.0f);
 }
 
 static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool with_lobes, bool* any_lobe)
@@ -65,7 +85,13 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             vf_store(batch->ny + at, vf_and(seen, ny));
             vf_store(batch->nz + at, vf_and(seen, nz));
             for (int k = 0; k < 3; k++) vf_store(batch->e[k] + at, zero);
-            if (job->visibility) ray_origins(g->geometric_normal + row, x, q, job->visibility->offset, batch, at);
+            if (job->visibility || job->near) ray_origins(g->geometric_normal + row, x, q, job->visibility ? job->visibility->offset : job->near->offset, batch, at);
+            vi index = morton(x, y);
+            if (job->sampled) vf_store(batch->choice + at, spread_number(job, index, 0x9e3779b9u, 3518319155u));
+            if (job->near) {
+                vf_store(batch->direction[0] + at, spread_number(job, index, 0x85ebca6bu, 2882110345u));
+                vf_store(batch->direction[1] + at, spread_number(job, index, 0xc2b2ae35u, 2360945575u));
+            }
             if (!with_lobes) continue;
             vf v[3];
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
@@ -229,6 +255,110 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
     }
 }
 
+/* ---- sampled lights -------------------------------------------------------------------------------------------------- */
+
+/* What a light would send to eight pixels, as luminance: G times its weight. */
+VINL vf light_weight(const es_shade_light* light, const vf p[3], const vf n[3], vf bound)
+{
+    vf dx = p[0] - vf_set1(light->position[0]), dy = p[1] - vf_set1(light->position[1]), dz = p[2] - vf_set1(light->position[2]);
+    vf qz = dx * vf_set1(light->normal[0]) + dy * vf_set1(light->normal[1]) + dz * vf_set1(light->normal[2]);
+    vf pixel_cos = dx * n[0] + dy * n[1] + dz * n[2]; /* times -r */
+    vm lit = vm_gt(qz, vf_zero()) & vm_lt(pixel_cos, vf_zero());
+    vf r2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(NEAREST2));
+    return vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + vf_set1(light->spread))), bound) * vf_set1(light->weight));
+}
+
+enum { KEPT_WEIGHTS = 64 };
+
+/* One light of the phase for each pixel. The weights of the first KEPT_WEIGHTS lights are kept, the others are computed twice. */
+static void choose_lights(const es_shade_job* job, const es_shade_light* lights, uint32_t phase, es_shade_batch* batch, uint32_t lanes)
+{
+    const uint32_t step = job->interleave * job->interleave, count = phase < job->vpl_count ? (job->vpl_count - phase + step - 1) / step : 0;
+    const vf zero = vf_zero(), bound = vf_set1(job->geometry_bound);
+    const vi none = vi_set1(-1);
+    for (uint32_t i = 0; i < lanes; i += VW) {
+        const vf p[3] = {vf_load(batch->px + i), vf_load(batch->py + i), vf_load(batch->pz + i)}, n[3] = {vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i)};
+        vf kept[KEPT_WEIGHTS], total = zero;
+        for (uint32_t k = 0; k < count; k++) {
+            vf weight = light_weight(&lights[phase + k * step], p, n, bound);
+            if (k < KEPT_WEIGHTS) kept[k] = weight;
+            total = total + weight;
+        }
+        vi light = none, record = none;
+        vf share = zero;
+        if (vm_any(vm_gt(total, zero))) {
+            vf threshold = vf_load(batch->choice + i) * total, sum = zero, weight = vf_set1(1.0f);
+            vm open = vm_gt(total, zero);
+            for (uint32_t k = 0; k < count && vm_any(open); k++) {
+                const es_shade_light* l = &lights[phase + k * step];
+                vf w = k < KEPT_WEIGHTS ? kept[k] : light_weight(l, p, n, bound);
+                sum = sum + w;
+                vm here = open & vm_gt(sum, threshold) & vm_gt(w, zero);
+                light = vi_select(here, vi_set1((int32_t)(phase + k * step)), light);
+                record = vi_select(here, vi_set1((int32_t)l->record), record);
+                weight = vf_select(here, vf_set1(l->weight), weight);
+                open &= ~here;
+            }
+            share = vf_and(~vi_eq(light, none), total / weight);
+        }
+        vi_store(batch->light + i, light);
+        vi_store(batch->chosen + i, record);
+        vf_store(batch->share + i, share);
+    }
+}
+
+enum { LIGHT_WORDS = sizeof(es_shade_light) / sizeof(float) };
+_Static_assert(sizeof(es_shade_light) % sizeof(float) == 0, "lights are gathered word by word");
+
+/* A field of each pixel's own light: `field` is the first light's. */
+VINL void gather_vector(const float field[3], vi at, vf out[3])
+{
+    for (int k = 0; k < 3; k++) out[k] = vf_gather(field + k, at);
+}
+
+static void apply_chosen(const es_shade_job* job, const es_shade_light* lights, es_shade_batch* batch, uint32_t lanes, bool lobes)
+{
+    for (uint32_t i = 0; i < lanes; i += VW) {
+        vm lit = vi_load(batch->visible + i) & ~vi_eq(vi_load(batch->chosen + i), vi_set1(-1));
+        if (!vm_any(lit)) continue;
+        const vi at = (vi_load(batch->light + i) & lit) * vi_set1(LIGHT_WORDS);
+        vf share = vf_and(lit, vf_load(batch->share + i)), sent[3];
+        gather_vector(lights->color, at, sent);
+        if (!lobes) {
+            for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, share * sent[k]);
+            continue;
+        }
+        vf p[3], n[3], w[3], pass = vf_set1(1.0f), lobe[3];
+        gather_vector(lights->position, at, p);
+        w[0] = vf_load(batch->px + i) - p[0];
+        w[1] = vf_load(batch->py + i) - p[1];
+        w[2] = vf_load(batch->pz + i) - p[2];
+        vf inverse = vf_set1(1.0f) / vf_sqrt(vf_max(w[0] * w[0] + w[1] * w[1] + w[2] * w[2], vf_set1(NEAREST2)));
+        for (int k = 0; k < 3; k++) w[k] = w[k] * inverse;
+        vi flags = vi_gather((const char*)lights + offsetof(es_shade_light, glossy), at) & vi_set1(0xff);
+        vm glossy = lit & ~vi_eq(flags, vi_zero());
+        if (vm_any(glossy)) {
+            es_surface_v surface = {.roughness = vf_gather(&lights->roughness, at), .model = vi_gather(&lights->model, at)};
+            vf incident[3], power[3];
+            gather_vector(lights->specular_color, at, surface.specular);
+            gather_vector(lights->incident, at, incident);
+            gather_vector(lights->power, at, power);
+            gather_vector(lights->normal, at, n);
+            es_surface_parts_v(&surface, n[0], n[1], n[2], incident[0], incident[1], incident[2], w[0], w[1], w[2], &pass, lobe);
+            for (int k = 0; k < 3; k++) sent[k] = vf_select(glossy, sent[k] * pass + power[k] * lobe[k], sent[k]);
+            pass = vf_set1(1.0f);
+        }
+        if (batch->lobed[i / VW]) {
+            es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
+                .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
+            es_surface_parts_v(&surface, vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i), vf_neg(w[0]), vf_neg(w[1]), vf_neg(w[2]),
+                vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i), &pass, lobe);
+            for (int k = 0; k < 3; k++) vf_store(batch->s[k] + i, vf_and(lit, share * sent[k] * lobe[k]));
+        }
+        for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_and(lit, share * sent[k] * pass));
+    }
+}
+
 static void apply_traced(const es_shade_job* job, const es_shade_light* light, uint32_t vpl, es_shade_batch* batch, uint32_t lanes, bool lobes)
 {
     job->visibility->test(job->visibility, vpl, batch, lanes);
@@ -256,7 +386,14 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
     const size_t map_texels = (size_t)job->map_size * job->map_size;
     bool lobes = false;
     gather(job, p, batch, job->specular[0] != NULL, &lobes);
-    for (uint32_t v = phase; v < job->vpl_count; v += n * n) {
+    if (job->sampled) {
+        choose_lights(job, lights, phase, batch, lanes);
+        job->visibility->test_chosen(job->visibility, batch, lanes);
+        bool glossy = lobes;
+        for (uint32_t v = phase; v < job->vpl_count && !glossy; v += n * n) glossy = lights[v].glossy;
+        apply_chosen(job, lights, batch, lanes, glossy);
+    }
+    for (uint32_t v = phase; v < job->vpl_count && !job->sampled; v += n * n) {
         const es_shade_light* light = &lights[v];
         const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
         const enum shadow shadow = map ? SHADOW_BY_MAP : NO_SHADOW;
@@ -267,6 +404,7 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         else if (map) apply_diffuse(job, light, map, v + n * n < job->vpl_count ? map + n * n * map_texels : map, batch, lanes, true);
         else apply_diffuse(job, light, NULL, NULL, batch, lanes, false);
     }
+    if (job->near) job->near->add(job->near, batch, lanes, lobes);
     scatter(job->gbuffer, p, n, batch->e, job->irradiance);
     if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);
 }
