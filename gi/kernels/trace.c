@@ -245,14 +245,14 @@ static inline bool step_any(const es_bvh* bvh, walk* w, uint8_t* blocked)
     return true;
 }
 
-/* hits or blocked is NULL */
-VINL void by_turns(const es_bvh* bvh, const es_ray* rays, uint32_t count, es_hit* hits, uint8_t* blocked)
+/* nearest: into hits, blocked is NULL; otherwise the other way round */
+VINL void by_turns(const es_bvh* bvh, bool nearest, const es_ray* rays, uint32_t count, es_hit* hits, uint8_t* blocked)
 {
     walk walks[WALKS];
     const uint32_t most_walks = bvh->node_count < FEW_NODES ? FEW_WALKS : WALKS;
     uint32_t next = 0, under_way = 0;
     for (uint32_t i = 0; i < count; i++) {
-        if (hits)
+        if (nearest)
             hits[i] = (es_hit){rays[i].max, 0.0f, 0.0f, ES_NO_PRIMITIVE};
         else
             blocked[i] = 0;
@@ -261,7 +261,7 @@ VINL void by_turns(const es_bvh* bvh, const es_ray* rays, uint32_t count, es_hit
     while (under_way)
         for (uint32_t i = 0; i < under_way; i++) {
             walk* w = &walks[i];
-            if (hits ? step_closest(bvh, w, &hits[w->ray]) : step_any(bvh, w, &blocked[w->ray])) continue;
+            if (nearest ? step_closest(bvh, w, &hits[w->ray]) : step_any(bvh, w, &blocked[w->ray])) continue;
             if (next < count) {
                 start(w, &rays[next], next);
                 next++;
@@ -357,7 +357,7 @@ static void closest_together(const es_bvh* bvh, const es_ray* rays, es_hit* hits
 {
     ray_packet p;
     if (!gather(&p, rays)) {
-        by_turns(bvh, rays, VW, hits, NULL);
+        by_turns(bvh, true, rays, VW, hits, NULL);
         return;
     }
     float nearest[VW], farthest = rays[0].max;
@@ -401,7 +401,7 @@ static void any_together(const es_bvh* bvh, const es_ray* rays, uint8_t* blocked
 {
     ray_packet p;
     if (!gather(&p, rays)) {
-        by_turns(bvh, rays, VW, NULL, blocked);
+        by_turns(bvh, false, rays, VW, NULL, blocked);
         return;
     }
     vf nearest;
@@ -435,12 +435,12 @@ void ES_KERNEL(es_gi_trace_closest)(const es_bvh* bvh, bool coherent, const es_r
 {
     uint32_t i = 0;
     for (; coherent && i + VW <= count; i += VW) closest_together(bvh, rays + i, hits + i);
-    if (i < count) by_turns(bvh, rays + i, count - i, hits + i, NULL);
+    if (i < count) by_turns(bvh, true, rays + i, count - i, hits + i, NULL);
 }
 
 void ES_KERNEL(es_gi_trace_any)(const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked)
 {
     uint32_t i = 0;
     for (; coherent && i + VW <= count; i += VW) any_together(bvh, rays + i, blocked + i);
-    if (i < count) by_turns(bvh, rays + i, count - i, NULL, blocked + i);
+    if (i < count) by_turns(bvh, false, rays + i, count - i, NULL, blocked + i);
 }
