@@ -8,6 +8,8 @@
 #define ISM_1 "imperfect maps, every light at every pixel", 3, true
 #define OTHER "imperfect maps, 1024 lights, one thing changed", 2, false
 #define CLASSIC "accurate maps, 8×8 interleaved", 4, true
+#define HALF "imperfect maps, half resolution", 2, true
+#define SAMPLED "one light a pixel, tested by a ray, half resolution", 4, true
 #define RAYS "rays to the lights, 8×8 interleaved", 6, false
 
 static const error_setting table[] = {
@@ -44,6 +46,16 @@ static const error_setting table[] = {
     {OTHER, "lights wherever light falls", "gi=ism vpl.count=1024 vpl.view-importance=false", false},
     {OTHER, "lights without extent", "gi=ism vpl.count=1024 vpl.spread=0", false},
     {OTHER, "bias compensated by 4 rays", "gi=ism vpl.count=1024 traced.bias=compensated traced.samples=4", false},
+
+    {HALF, "256 lights", "gi=ism half-resolution=true vpl.count=256", false},
+    {HALF, "512 lights", "gi=ism half-resolution=true vpl.count=512", false},
+    {HALF, "1024 lights", "gi=ism half-resolution=true vpl.count=1024", true},
+    {HALF, "2048 lights", "gi=ism half-resolution=true vpl.count=2048", false},
+    {OTHER, "half resolution, 512 lights, 6×6, less bounded",
+        "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=512 vpl.bound=50000 vpl.spread=1", true},
+
+    {SAMPLED, "1024 lights", "gi=vpl-sampled half-resolution=true vpl.near=0.08", true},
+    {SAMPLED, "4096 lights", "gi=vpl-sampled half-resolution=true vpl.near=0.04 vpl.count=4096", false},
 
     {CLASSIC, "256 lights", "gi=classic vpl.count=256", false},
     {CLASSIC, "1024 lights", "gi=classic vpl.count=1024", false},
