@@ -12,11 +12,11 @@
 typedef struct effort {
     uint32_t repetitions;
     double repetition_seconds; /* enough after this */
-    uint32_t truth_samples, flicker_frames, flicker_samples, tracer_samples;
+    uint32_t truth_samples, flicker_frames, flicker_samples, tracer_samples, agreement_samples;
     double truth_seconds, flicker_seconds, tracer_seconds, embree_seconds;
 } effort;
-static const effort full = {7, 2.0, 64, 4, 96, 1024, 75, 6, 75, 45};
-static const effort quick = {3, 0.6, 8, 3, 24, 64, 9, 1.5, 9, 6};
+static const effort full = {7, 2.0, 64, 4, 96, 1024, 32, 75, 6, 75, 45};
+static const effort quick = {3, 0.6, 8, 3, 24, 64, 16, 9, 1.5, 9, 6};
 
 enum { MAX_FRAMES = 4, FLICKER_PART = 4 /* of the width and height */ };
 
@@ -185,7 +185,8 @@ static bool measure_scene(run* r, error_scene* scene, bench_peer* peer)
         error_run_embree(r->context, r->options, peer, &scene->truth, r->effort.tracer_samples, r->effort.embree_seconds, &scene->embree);
         scene->truth.noise_relrmse = error_at_samples(&scene->embree.raw, (double)scene->truth.samples);
         if (scene->embree.why[0]) fprintf(stderr, "earthshine: %s\n", scene->embree.why);
-        if (!error_trace_curve(r->context, r->world, &scene->truth, r->effort.tracer_samples, r->effort.tracer_seconds, &scene->ours, &scene->agreement)) return false;
+        if (!error_trace_curve(r->context, r->world, &scene->truth, r->effort.tracer_samples, r->effort.tracer_seconds, &scene->ours)) return false;
+        if (!error_trace_agreement(r->context, r->world, &scene->truth, r->effort.agreement_samples, r->effort.tracer_seconds, &scene->agreement)) return false;
     }
     const error_setting* setting;
     for (size_t i = 0; !only_tracers && (setting = error_setting_at(i)) != NULL && scene->count < ERROR_MAX_SETTINGS; i++)

@@ -75,6 +75,9 @@ double error_seconds_to(const error_curve* curve, double relrmse, bool* extrapol
 /* relRMSE that the last two doublings lead to after so many samples; NaN when they do not. */
 double error_at_samples(const error_curve* curve, double samples);
 
+/* Our path tracer against the truth, until `seconds`. */
+bool error_trace_curve(es_context* context, es_world* world, const error_truth* truth, uint32_t samples, double seconds, error_curve* curve);
+
 /* Share of square blocks whose means differ by no more than three standard errors. */
 typedef struct error_agreement {
     uint32_t side;            /* pixels */
@@ -83,8 +86,7 @@ typedef struct error_agreement {
     double* deviations;       /* of each block, in standard errors, rising; freed by the caller */
     uint64_t samples;         /* of ours */
 } error_agreement;
-/* Our path tracer against the truth, until `seconds`; the curve and, at its end, how well both agree. */
-bool error_trace_curve(es_context* context, es_world* world, const error_truth* truth, uint32_t samples, double seconds, error_curve* curve, error_agreement* agreement);
+bool error_trace_agreement(es_context* context, es_world* world, const error_truth* truth, uint32_t samples, double seconds, error_agreement* agreement);
 
 /* ---- Embree's path tracer (bench_error_embree.c) ----------------------------------------------------------------- */
 

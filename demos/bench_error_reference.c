@@ -8,7 +8,8 @@
 #include <string.h>
 #include <unistd.h>
 
-static es_reference* begin(es_context* context, es_world* world, uint32_t width, uint32_t height, uint32_t seed)
+/* share 0: the default */
+static es_reference* begin(es_context* context, es_world* world, uint32_t width, uint32_t height, uint32_t seed, uint32_t share)
 {
     es_reference_settings settings = es_default_reference_settings();
     settings.width = width;
@@ -16,6 +17,7 @@ static es_reference* begin(es_context* context, es_world* world, uint32_t width,
     settings.seed = seed;
     settings.bounces = 1;
     settings.antialias = false;
+    if (share) settings.share = share;
     settings.emission = false; /* the real-time methods have no light from glowing surfaces either */
     es_reference* reference = NULL;
     if (es_reference_create(context, &settings, &reference) == ES_OK && es_reference_begin(reference, world) == ES_OK) return reference;
@@ -37,7 +39,7 @@ static bool take_images(es_context* context, es_reference* reference, int half, 
 
 static bool trace_half(es_context* context, es_world* world, const error_effort* effort, int half, error_truth* truth)
 {
-    es_reference* reference = begin(context, world, effort->width, effort->height, effort->seed + (uint32_t)half);
+    es_reference* reference = begin(context, world, effort->width, effort->height, effort->seed + (uint32_t)half, 0);
     char path[DEMO_PATH_SIZE] = "";
     if (!reference) return false;
     if (effort->cache) snprintf(path, sizeof path, "%.4000s-%d.exr", effort->cache, half);
@@ -131,13 +133,12 @@ static void agree(const es_image* ours, const es_image* noise, uint64_t samples,
     if (agreement->deviations) qsort(agreement->deviations, agreement->blocks, sizeof(double), rising);
 }
 
-bool error_trace_curve(es_context* context, es_world* world, const error_truth* truth, uint32_t samples, double seconds, error_curve* curve, error_agreement* agreement)
+bool error_trace_curve(es_context* context, es_world* world, const error_truth* truth, uint32_t samples, double seconds, error_curve* curve)
 {
     *curve = (error_curve){0};
-    *agreement = (error_agreement){0};
-    es_reference* reference = begin(context, world, truth->indirect.width, truth->indirect.height, 0);
+    es_reference* reference = begin(context, world, truth->indirect.width, truth->indirect.height, 0, 0);
     bool works = reference != NULL;
-    es_image indirect = {0}, noise = {0};
+    es_image indirect = {0};
     for (uint32_t wanted = 1; works && wanted <= samples && curve->count < ERROR_MAX_POINTS; wanted *= 2) {
         es_reference_stats stats = es_reference_get_stats(reference);
         if (stats.seconds >= seconds && wanted > 4) break; /* three points say where the curve leads */
@@ -152,7 +153,25 @@ bool error_trace_curve(es_context* context, es_world* world, const error_truth* 
         fprintf(stderr, "  our path tracer: %u samples, %.2f s, relRMSE %.3f\n", wanted, stats.seconds, curve->points[curve->count].error.relrmse);
         curve->count++;
     }
-    works = works && es_reference_image(reference, "indirect-error", &noise) == ES_OK;
+    if (!works) demo_refuse_context(context);
+    es_image_destroy(context, &indirect);
+    es_reference_destroy(reference);
+    return works;
+}
+
+/* Pixels that share paths err together, and a block's error does not follow from theirs: here none do. */
+bool error_trace_agreement(es_context* context, es_world* world, const error_truth* truth, uint32_t samples, double seconds, error_agreement* agreement)
+{
+    *agreement = (error_agreement){0};
+    es_reference* reference = begin(context, world, truth->indirect.width, truth->indirect.height, 0, 1);
+    bool works = reference != NULL;
+    es_image indirect = {0}, noise = {0};
+    while (works) {
+        es_reference_stats stats = es_reference_get_stats(reference);
+        if (stats.samples >= samples || (stats.samples && stats.seconds >= seconds)) break;
+        works = es_reference_add(reference, 1) == ES_OK;
+    }
+    works = works && es_reference_image(reference, "indirect", &indirect) == ES_OK && es_reference_image(reference, "indirect-error", &noise) == ES_OK;
     if (works) agree(&indirect, &noise, es_reference_get_stats(reference).samples, truth, agreement);
     else demo_refuse_context(context);
     es_image_destroy(context, &indirect);

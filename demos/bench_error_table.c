@@ -51,6 +51,8 @@ static const error_setting table[] = {
     {HALF, "512 lights", "gi=ism half-resolution=true vpl.count=512", false},
     {HALF, "1024 lights", "gi=ism half-resolution=true vpl.count=1024", true},
     {HALF, "2048 lights", "gi=ism half-resolution=true vpl.count=2048", false},
+    {OTHER, "half resolution, 384 lights, 6×6, less bounded",
+        "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=384 vpl.bound=50000 vpl.spread=1", false},
     {OTHER, "half resolution, 512 lights, 6×6, less bounded",
         "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=512 vpl.bound=50000 vpl.spread=1", true},
 
