@@ -30,7 +30,8 @@
     /* the tile whose first pixel is (x, y), once it is loaded */                                                \
     X(flip, (const es_flip_job* job, uint32_t x, uint32_t y, const es_flip_scratch* scratch))                    \
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
-    X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))
+    X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))       \
+    X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))
 
 struct es_gi_kernels {
 #define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;

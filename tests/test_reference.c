@@ -266,6 +266,30 @@ static void test_stops_at_samples_and_seconds(void** state)
     small_world_destroy(&w);
 }
 
+/* ---- what lets rays through ---------------------------------------------------------------------------------------------------------------------- */
+
+/* Surfaces modelled twice, back to back in one plane: the camera sees the front, whichever of the two comes first. */
+static void test_back_to_back(void** state)
+{
+    for (int first = 0; first < 2; first++) {
+        small_world w = small_world_create();
+        es_material_desc glowing = lambert(0.5f, 1.0f);
+        const es_vec3 corner = es_v3(-3.1f, -2.9f, -1.3f), u = es_v3(6.3f, 0.7f, 0.9f), v = es_v3(-0.4f, 6.1f, 1.1f);
+        for (int i = 0; i < 2; i++) {
+            if (i == first) add_rectangle(&w, corner, u, v, &glowing);
+            else add_rectangle(&w, corner, v, u, &glowing);
+        }
+        look_straight(&w, es_v3(0, 0, 0), es_v3(0, 0, 1), 5, 1);
+        es_reference_settings s = reference_settings(WIDTH, HEIGHT, 0);
+        es_reference* reference = trace(&w, &s, 1);
+        es_image image = traced(reference, "emission");
+        for (size_t i = 0; i < (size_t)3 * WIDTH * HEIGHT; i++) assert_true(image.pixels[i] == 1.0f);
+        es_image_destroy(w.context, &image);
+        es_reference_destroy(reference);
+        small_world_destroy(&w);
+    }
+}
+
 /* ---- the same bits ---------------------------------------------------------------------------------------------------------------------------- */
 
 static uint64_t hash_of(small_world* w, es_reference* reference)
@@ -399,6 +423,7 @@ int main(void)
         cmocka_unit_test(test_error_is_honest),
         cmocka_unit_test(test_stops_at_an_error),
         cmocka_unit_test(test_stops_at_samples_and_seconds),
+        cmocka_unit_test(test_back_to_back),
         cmocka_unit_test(test_determinism),
         cmocka_unit_test(test_resuming),
         cmocka_unit_test(test_light_choice),

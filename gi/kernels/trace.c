@@ -72,8 +72,8 @@ static void repair_edges(vf ax, vf ay, vf bx, vf by, vf cx, vf cy, vf* u, vf* v,
     }
 }
 
-/* Which of the block's triangles the ray meets between low and high, ends excluded (a hit at high counts for `ties`); distance and weights
- * are valid there. */
+/* Which of the block's triangles the ray meets beyond low and up to high, which is included so that ties can be told apart; distance and
+ * weights are valid there. */
 VINL vm meet_block(const es_bvh_block* block, const ray_setup* s, vf low, vf high, vf* t, vf* v, vf* w)
 {
     const vf zero = vf_zero();
@@ -143,8 +143,9 @@ VINL entry push(const uint32_t* child, uint32_t bits, vf distance, entry* stack,
     return stack[top - 1];
 }
 
-/* The nearest of the block's hits, if it is nearer than what there is; the block's box begins at `begin`. */
-VINL void take_nearest(const es_bvh_block* block, const ray_setup* s, vf low, float begin, float* nearest, es_hit* hit)
+/* The nearest of the block's hits, if it is nearer than what there is; the block's box begins at `begin`. passed: of hits at its distance only those of
+ * later primitives count; a constant NULL at calls where speed matters. */
+VINL void take_nearest(const es_bvh_block* block, const ray_setup* s, vf low, float begin, const es_hit* passed, float* nearest, es_hit* hit)
 {
     vf t = vf_zero(), v = vf_zero(), w = vf_zero();
     uint32_t bits = vm_bits(meet_block(block, s, low, vf_set1(*nearest), &t, &v, &w));
@@ -152,6 +153,7 @@ VINL void take_nearest(const es_bvh_block* block, const ray_setup* s, vf low, fl
     vf key = vf_max(t, vf_set1(begin * NEAR_MARGIN));
     for (; bits; bits &= bits - 1) {
         uint32_t i = (uint32_t)__builtin_ctz(bits);
+        if (passed && t[i] == passed->t && block->primitive[i] <= passed->primitive) continue;
         /* the ray's own end is excluded, a hit at the nearest so far is not */
         if (key[i] < *nearest || (key[i] == *nearest && hit->primitive != ES_NO_PRIMITIVE && block->primitive[i] < hit->primitive)) {
             *nearest = key[i];
@@ -204,7 +206,7 @@ static inline void move_to(walk* to, const walk* from)
 static inline bool step_closest(const es_bvh* bvh, walk* w, es_hit* hit)
 {
     if (w->at.child & ES_BVH_BLOCK) {
-        take_nearest(&bvh->blocks[w->at.child & ~ES_BVH_BLOCK], &w->s, w->low, w->at.distance, &w->nearest, hit);
+        take_nearest(&bvh->blocks[w->at.child & ~ES_BVH_BLOCK], &w->s, w->low, w->at.distance, NULL, &w->nearest, hit);
     } else {
         const es_bvh_node* node = &bvh->nodes[w->at.child];
         vf distance;
@@ -376,7 +378,7 @@ static void closest_together(const es_bvh* bvh, const es_ray* rays, es_hit* hits
             if (bits) {
                 for (; bits; bits &= bits - 1) {
                     int i = __builtin_ctz(bits);
-                    take_nearest(&bvh->blocks[block], &p.rays[i], vf_set1(rays[i].min), begin[i], &nearest[i], &hits[i]);
+                    take_nearest(&bvh->blocks[block], &p.rays[i], vf_set1(rays[i].min), begin[i], NULL, &nearest[i], &hits[i]);
                 }
                 farthest = most(vf_load(nearest));
             }
@@ -443,4 +445,35 @@ void ES_KERNEL(es_gi_trace_any)(const es_bvh* bvh, bool coherent, const es_ray* 
     uint32_t i = 0;
     for (; coherent && i + VW <= count; i += VW) any_together(bvh, rays + i, blocked + i);
     if (i < count) by_turns(bvh, false, rays + i, count - i, NULL, blocked + i);
+}
+
+/* Triangles in one plane are hit at one distance: going on beyond that distance would pass by those not looked at yet. So the ray goes on from the
+ * float before it, and what has been passed is told by its primitive. */
+void ES_KERNEL(es_gi_trace_beyond)(const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit)
+{
+    ray_setup s;
+    prepare(ray, &s);
+    const vf low = vf_from_bits(vi_from_bits(vf_set1(passed->t)) - vi_set1(1));
+    float nearest = ray->max;
+    *hit = (es_hit){ray->max, 0.0f, 0.0f, ES_NO_PRIMITIVE};
+    entry stack[ES_BVH_STACK], at = {0, low[0]};
+    uint32_t size = 0;
+    for (;;) {
+        if (at.child & ES_BVH_BLOCK) {
+            take_nearest(&bvh->blocks[at.child & ~ES_BVH_BLOCK], &s, low, at.distance, passed, &nearest, hit);
+        } else {
+            const es_bvh_node* node = &bvh->nodes[at.child];
+            vf distance;
+            uint32_t bits = meet_node(node, &s, low, nearest, &distance);
+            if (bits) {
+                at = push(node->child, bits, distance, stack, &size);
+                continue;
+            }
+        }
+        do {
+            if (!size) return;
+            size--;
+        } while (stack[size].distance > nearest * FAR_MARGIN);
+        at = stack[size];
+    }
 }

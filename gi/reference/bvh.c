@@ -191,6 +191,11 @@ void es_bvh_any(const es_bvh* bvh, es_ray_kind kind, const es_ray* rays, uint32_
     es_gi_kernel_table(es_context_isa(bvh->context))->trace_any(bvh, kind == ES_RAYS_COHERENT, rays, count, blocked);
 }
 
+void es_bvh_beyond(const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit)
+{
+    es_gi_kernel_table(es_context_isa(bvh->context))->trace_beyond(bvh, ray, passed, hit);
+}
+
 es_vec3 es_offset_origin(es_vec3 p, es_vec3 n)
 {
     /* The point comes from barycentrics in float: off by some units in the last place of the largest coordinate, 2^-23 of it each. 64 of

@@ -188,13 +188,11 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
 
 /* ---- rays ------------------------------------------------------------------------------------------------------------------------------ */
 
-static bool lets_through(const es_trace_scene* scene, const es_hit* hit, const es_ray* ray, bool camera)
+bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit)
 {
     const es_bvh_primitive* primitive = &es_bvh_primitives(scene->bvh)[hit->primitive];
     const es_raster_instance* instance = &scene->instances[primitive->instance];
     const es_material_desc* m = &scene->materials[instance->material];
-    es_vec3 unused;
-    if (camera && !m->double_sided && !faces(scene, instance, hit->primitive, es_v3(-ray->direction[0], -ray->direction[1], -ray->direction[2]), &unused)) return true;
     if (!m->alpha_mask) return false;
     corner_weights c = weights_of(instance->mesh, primitive->triangle, hit->u, hit->v);
     float alpha = m->base_color[3], color[4], uvs[4] = {0, 0, 0, 0}, texel[4];
@@ -210,15 +208,24 @@ static bool lets_through(const es_trace_scene* scene, const es_hit* hit, const e
     return alpha < m->alpha_cutoff;
 }
 
+static bool lets_through(const es_trace_scene* scene, const es_hit* hit, const es_ray* ray, bool camera)
+{
+    const es_raster_instance* instance = &scene->instances[es_bvh_primitives(scene->bvh)[hit->primitive].instance];
+    es_vec3 unused;
+    if (camera && !scene->materials[instance->material].double_sided &&
+        !faces(scene, instance, hit->primitive, es_v3(-ray->direction[0], -ray->direction[1], -ray->direction[2]), &unused)) return true;
+    return es_trace_is_hole(scene, hit);
+}
+
 bool es_trace_closest(const es_trace_scene* scene, es_ray ray, bool camera, es_hit* hit)
 {
-    /* each turn begins beyond the surface that let the ray through; a hit needs t > min, so it ends */
-    for (;;) {
-        es_bvh_closest(scene->bvh, ES_RAYS_SINGLE, &ray, 1, hit);
-        if (hit->primitive == ES_NO_PRIMITIVE) return false;
+    es_bvh_closest(scene->bvh, ES_RAYS_SINGLE, &ray, 1, hit);
+    while (hit->primitive != ES_NO_PRIMITIVE) {
         if ((!camera && !scene->has_masks) || !lets_through(scene, hit, &ray, camera)) return true;
-        ray.min = hit->t;
+        const es_hit passed = *hit;
+        es_bvh_beyond(scene->bvh, &ray, &passed, hit);
     }
+    return false;
 }
 
 bool es_trace_blocked(const es_trace_scene* scene, es_ray ray)

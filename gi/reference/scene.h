@@ -48,6 +48,8 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
 /* The nearest surface that stops the ray, alpha masks applied. `camera`: backs of single-sided surfaces do not stop it. */
 bool es_trace_closest(const es_trace_scene* scene, es_ray ray, bool camera, es_hit* hit);
 bool es_trace_blocked(const es_trace_scene* scene, es_ray ray);
+/* Is the alpha mask open there? */
+bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit);
 
 /* Radiance of the environment from a direction (unit). */
 es_vec3 es_trace_environment(const es_trace_scene* scene, es_vec3 direction);
