@@ -290,6 +290,26 @@ static void test_back_to_back(void** state)
     }
 }
 
+/* Where an alpha mask is open nothing glows. */
+static void test_open_mask_gives_no_light(void** state)
+{
+    small_world w = small_world_create();
+    es_material_desc floor = lambert(0.5f, 0), hole = lambert(0.5f, 10);
+    hole.alpha_mask = hole.double_sided = true;
+    hole.alpha_cutoff = 0.5f;
+    hole.base_color[3] = 0;
+    add_rectangle(&w, es_v3(-2, 0, 2), es_v3(4, 0, 0), es_v3(0, 0, -4), &floor);
+    add_rectangle(&w, es_v3(-1, 1, 1), es_v3(2, 0, 0), es_v3(0, 0, -2), &hole);
+    look_straight(&w, es_v3(0, 0, 0), es_v3(0, 1, 0), 0.5f, 0.3f);
+    es_reference_settings s = reference_settings(WIDTH, HEIGHT, 1);
+    es_reference* reference = trace(&w, &s, 4);
+    es_image image = traced(reference, "radiance");
+    for (size_t i = 0; i < (size_t)3 * WIDTH * HEIGHT; i++) assert_true(image.pixels[i] == 0.0f);
+    es_image_destroy(w.context, &image);
+    es_reference_destroy(reference);
+    small_world_destroy(&w);
+}
+
 /* ---- the same bits ---------------------------------------------------------------------------------------------------------------------------- */
 
 static uint64_t hash_of(small_world* w, es_reference* reference)
@@ -424,6 +444,7 @@ int main(void)
         cmocka_unit_test(test_stops_at_an_error),
         cmocka_unit_test(test_stops_at_samples_and_seconds),
         cmocka_unit_test(test_back_to_back),
+        cmocka_unit_test(test_open_mask_gives_no_light),
         cmocka_unit_test(test_determinism),
         cmocka_unit_test(test_resuming),
         cmocka_unit_test(test_light_choice),

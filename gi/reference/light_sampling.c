@@ -113,6 +113,7 @@ static bool sample_emitter(const es_trace_scene* scene, es_vec3 point, const flo
     es_bvh_triangle(scene->bvh, primitive, c);
     float root = es_sqrt(u[1]);
     es_hit hit = {0.0f, root * (1.0f - u[2]), root * u[2], primitive};
+    if (scene->has_masks && es_trace_is_hole(scene, &hit)) return false;
     es_vec3 p = es_v3_add(es_v3_add(es_v3_scale(c[0], 1.0f - root), es_v3_scale(c[1], hit.u)), es_v3_scale(c[2], hit.v));
     es_vec3 d = es_v3_sub(p, point);
     float distance = es_v3_length(d);
