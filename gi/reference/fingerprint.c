@@ -66,5 +66,8 @@ uint64_t es_reference_fingerprint(const es_reference* r)
     const es_environment_desc* e = &scene->environment;
     hash = es_hash_bytes(hash, e->radiance, sizeof e->radiance);
     hash = es_hash_bytes(hash, &e->rotation, sizeof e->rotation);
-    return e->image ? es_hash_bytes(hash, e->image->pixels, (size_t)e->image->width * e->image->height * e->image->channels * sizeof(float)) : hash;
+    if (!e->image) return hash;
+    const uint32_t size[] = {e->image->width, e->image->height, e->image->channels};
+    hash = es_hash_bytes(hash, size, sizeof size);
+    return es_hash_bytes(hash, e->image->pixels, (size_t)size[0] * size[1] * size[2] * sizeof(float));
 }
