@@ -1,5 +1,6 @@
 #include "gi/bias_compensation.h"
 
+#include "gi/reference/light_choice.h"
 #include "gi/reference/path.h"
 #include "gi/shade.h"
 #include "platform/maths.h"
@@ -56,25 +57,10 @@ static bool sample_direction(const pixel* p, const float u[3], float choice, es_
 
 bool es_lamp_reaches(const es_trace_scene* scene, const es_light_state* light, const es_trace_surface* s, es_vec3* direction, float* strength)
 {
-    es_ray ray = {.max = 3e38f};
-    *strength = 1.0f;
-    if (light->type == ES_LIGHT_DIRECTIONAL) {
-        *direction = es_v3_scale(light->direction, -1.0f);
-    } else {
-        es_vec3 d = es_v3_sub(light->position, s->position);
-        float distance = es_v3_length(d);
-        if (!(distance > 0.0f)) return false;
-        *direction = es_v3_scale(d, 1.0f / distance);
-        *strength = es_light_falloff(light, es_v3_scale(*direction, -1.0f), distance) / distance / distance;
-    }
+    float distance;
+    if (!es_trace_towards_light(light, s->position, direction, &distance, strength)) return false;
     if (!(*strength > 0.0f && es_v3_dot(s->geometric, *direction) > 0.0f)) return false;
-    es_vec3 o = es_offset_origin(s->position, s->geometric), target = *direction;
-    if (light->type != ES_LIGHT_DIRECTIONAL) {
-        target = es_v3_sub(light->position, o);
-        ray.max = 0.99999f;
-    }
-    ray = (es_ray){{o.x, o.y, o.z}, 0.0f, {target.x, target.y, target.z}, ray.max};
-    return !es_trace_blocked(scene, ray);
+    return !es_trace_blocked(scene, es_trace_shadow_ray(light, s, *direction));
 }
 
 /* Of the light that goes from lamp over hit to pixel, per W/m² on the hit: the exact one less what lights are gathered with, over the

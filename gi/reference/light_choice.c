@@ -20,6 +20,14 @@ bool es_trace_towards_light(const es_light_state* light, es_vec3 point, es_vec3*
     return true;
 }
 
+es_ray es_trace_shadow_ray(const es_light_state* light, const es_trace_surface* s, es_vec3 direction)
+{
+    es_vec3 o = es_offset_origin(s->position, s->geometric);
+    if (light->type == ES_LIGHT_DIRECTIONAL) return (es_ray){{o.x, o.y, o.z}, 0.0f, {direction.x, direction.y, direction.z}, 3e38f};
+    es_vec3 d = es_v3_sub(light->position, o);
+    return (es_ray){{o.x, o.y, o.z}, 0.0f, {d.x, d.y, d.z}, 0.99999f};
+}
+
 static double weight_of(const es_light_state* light, const es_trace_surface* s)
 {
     es_vec3 direction;

@@ -53,21 +53,8 @@ static bool black(es_vec3 c) { return !(c.x > 0.0f || c.y > 0.0f || c.z > 0.0f);
 
 static es_ray ray_from(const es_trace_surface* s, es_vec3 direction, float max)
 {
-    es_vec3 side = es_v3_dot(s->geometric, direction) < 0.0f ? es_v3_scale(s->geometric, -1.0f) : s->geometric;
-    es_vec3 o = es_offset_origin(s->position, side);
+    es_vec3 o = es_offset_origin(s->position, s->geometric);
     return (es_ray){{o.x, o.y, o.z}, 0.0f, {direction.x, direction.y, direction.z}, max};
-}
-
-/* Towards the light from the moved origin; what is as near to the light as rounding is the light's own place. */
-static es_ray shadow_ray(const es_light_state* light, const es_trace_surface* s, es_vec3 towards)
-{
-    es_ray ray = ray_from(s, towards, 3e38f);
-    if (light->type == ES_LIGHT_DIRECTIONAL) return ray;
-    ray.max = 0.99999f;
-    ray.direction[0] = light->position.x - ray.origin[0];
-    ray.direction[1] = light->position.y - ray.origin[1];
-    ray.direction[2] = light->position.z - ray.origin[2];
-    return ray;
 }
 
 /* What arrives at a surface from one spot, point or directional light, unless its shadow ray is blocked: W/m² of the surface. */
@@ -80,7 +67,7 @@ static bool light_of(const es_light_state* light, const es_trace_surface* s, lam
     float cosine = es_v3_dot(s->normal, l->towards);
     if (!(cosine > 0.0f && es_v3_dot(s->geometric, l->towards) > 0.0f && strength > 0.0f)) return false;
     l->irradiance = es_v3_scale(es_v3(light->radiant[0], light->radiant[1], light->radiant[2]), cosine * strength);
-    l->shadow = shadow_ray(light, s, l->towards);
+    l->shadow = es_trace_shadow_ray(light, s, l->towards);
     return true;
 }
 
