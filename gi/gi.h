@@ -134,15 +134,17 @@ ES_API size_t es_renderer_points(const es_renderer* renderer, uint32_t map, floa
 
 /* ---- reference: a progressive path tracer over the same world ------------------------------------------------------------------- */
 
-/* All of them by name through es_reference_settings_set. Every vertex of a path samples the lights and the surface, combined by
- * multiple importance sampling (Veach 1997), and neighbouring pixels share their paths (Bekaert et al. 2002). Samples are a function of pixel and sample number alone: any number of threads, any
- * instruction set and any split into calls or files give the same bits. */
+/* All of them by name through es_reference_settings_set. Every vertex of a path samples the lights and the surface, combined by multiple
+ * importance sampling (Veach 1997), and neighbouring pixels share their paths (Bekaert et al. 2002). For the same settings samples are
+ * a function of pixel and sample number alone: any number of threads, any instruction set and any split into calls or files give the
+ * same bits. */
 typedef struct es_reference_settings {
     uint32_t width, height;   /* pixels */
     uint32_t bounces;         /* indirect ones: 0 direct light only, 1 as ES_GI_ISM does, … */
     uint32_t seed;
     bool antialias;           /* rays over the pixel's area; off: through its centre, as the real-time methods sample */
-    bool emission;            /* glowing surfaces and the environment light others; off: as the real-time methods that cannot */
+    bool emission;            /* glowing surfaces and the environment light others; off: as the real-time methods, for which surfaces glow but
+                               * light nothing and the environment is black */
     bool quantised;           /* the first hit's normal, colour and roughness are rounded as the G-buffer stores them */
     uint32_t share;           /* side of the tiles of pixels that share what their paths find, 1 … 8: less noise, but of tiles rather than of pixels, so
                                * that means over many pixels are no better; 1: pixels are independent of each other */
@@ -179,7 +181,8 @@ typedef struct es_reference_stats {
 ES_API es_reference_stats es_reference_get_stats(const es_reference* reference);
 
 /* "radiance" (everything), "emission" (seen directly), "direct", "indirect" (the sum of all bounces), "bounce-1" … "bounce-64", and with
- * "-error" appended the standard error of each, per pixel and channel. The caller destroys the image. */
+ * "-error" appended the standard error of each, per pixel and channel; with `share` above 1 the errors of neighbours go together. The caller
+ * destroys the image. */
 ES_API es_result es_reference_image(es_reference* reference, const char* name, es_image* image);
 ES_API bool es_reference_has_image(uint32_t bounces, const char* name);
 /* Writes an EXR whose R, G, B are the radiance; further channels hold the other images and the accumulators. */

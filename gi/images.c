@@ -20,7 +20,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
     {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
-    {IMAGE_COMPENSATION, "compensation", "of the indirect light, what vpl-traced finds by rays, W/(m² sr), of either sign"},
+    {IMAGE_COMPENSATION, "compensation", "of the indirect light, what traced.bias compensated finds by rays, W/(m² sr), of either sign"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
     {IMAGE_NORMAL, "normal", "world shading normal"},
     {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},

@@ -55,7 +55,7 @@ struct es_shade_near {
 };
 
 typedef struct es_shade_job {
-    const es_gbuffer* gbuffer;     /* depth and normal; with `specular` also albedo and surface; with `visibility` the geometric normal */
+    const es_gbuffer* gbuffer;     /* depth and normal; with `specular` also albedo and surface; with `visibility` or `near` the geometric normal */
     es_pixel_rays rays;
     const es_vpl_record* vpls;
     uint32_t vpl_count;

@@ -222,7 +222,6 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
 #undef ES_SAMPLE_
 }
 
-/* Edge functions at the pixel (x, y) and what follows from them. */
 /* Barycentric coordinates, perspective-correct, of the point of the triangle's border nearest to the pixel; x, y: window coordinates
  * times w relative to the pixel, w > 0. */
 VINL void nearest_on_border(const vf x[3], const vf y[3], const vf w[3], vf lambda[3])
@@ -249,6 +248,7 @@ VINL void nearest_on_border(const vf x[3], const vf y[3], const vf w[3], vf lamb
     }
 }
 
+/* Edge functions at the pixel (x, y) and what follows from them. */
 VINL void start_surface(const es_resolve_job* job, const es_prepared_instance* instance, vm active, vi id, vf x, vf y, bool gradients, surface8* s)
 {
     s->instance = instance;
