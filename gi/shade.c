@@ -4,7 +4,6 @@
  * one after another: its G-buffer lines serve all of them. */
 #include "gi/shade.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "gi/kernel_table.h"
@@ -81,11 +80,30 @@ static uint32_t spread_bits(uint32_t a)
     return (a | a << 2) & 0x09249249u;
 }
 
-static int by_place(const void* a, const void* b)
+static bool before(placed_light a, placed_light b) { return a.place != b.place ? a.place < b.place : a.record < b.record; }
+
+static void sift(placed_light* heap, uint32_t root, uint32_t count)
 {
-    const placed_light *p = a, *q = b;
-    if (p->place != q->place) return p->place < q->place ? -1 : 1;
-    return p->record < q->record ? -1 : p->record > q->record;
+    const placed_light moved = heap[root];
+    for (uint32_t child = 2 * root + 1; child < count; child = 2 * root + 1) {
+        if (child + 1 < count && before(heap[child], heap[child + 1])) child++;
+        if (!before(moved, heap[child])) break;
+        heap[root] = heap[child];
+        root = child;
+    }
+    heap[root] = moved;
+}
+
+/* A heap sort takes no memory; that of the C library may, past the context and its cap. */
+static void sort_lights(placed_light* lights, uint32_t count)
+{
+    for (uint32_t i = count / 2; i-- > 0;) sift(lights, i, count);
+    for (uint32_t last = count; last-- > 1;) {
+        const placed_light greatest = lights[0];
+        lights[0] = lights[last];
+        lights[last] = greatest;
+        sift(lights, 0, last);
+    }
 }
 
 /* Along a Morton curve through the box of all lights, phase by phase. */
@@ -108,7 +126,7 @@ static void order_lights(const es_shade_job* job, placed_light* order, uint32_t 
             for (int k = 0; k < 3; k++) place |= spread_bits((uint32_t)es_clampf((job->vpls[v].position[k] - low[k]) * scale[k], 0.0f, 1023.0f)) << k;
             order[at++] = (placed_light){place, v};
         }
-        qsort(order + first, at - first, sizeof *order, by_place);
+        sort_lights(order + first, at - first);
     }
 }
 
