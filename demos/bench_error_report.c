@@ -52,10 +52,11 @@ static const error_point* fastest(const error_scene* scene)
     return best;
 }
 
+/* "one thing changed" names a group on the plots; what was changed says it in a sentence. */
 static void describe(const error_point* point, char text[SETTING_NAME_SIZE])
 {
-    if (point->setting->line) snprintf(text, SETTING_NAME_SIZE, "%s, %s", point->setting->series, point->setting->label);
-    else snprintf(text, SETTING_NAME_SIZE, "%s", point->setting->label);
+    const char *series = point->setting->series, *group = strstr(series, ", one thing changed");
+    snprintf(text, SETTING_NAME_SIZE, "%.*s, %s", (int)(group ? (size_t)(group - series) : strlen(series)), series, point->setting->label);
 }
 
 /* ---- rows -------------------------------------------------------------------------------------------------------- */
@@ -226,7 +227,8 @@ static void add_setting_plot(bench_report* report, const error_scene* scene, mea
     else least_headline(scene, which, plot.headline);
     char noise[80] = "which is not known";
     if (isfinite(scene->truth.noise_relrmse)) snprintf(noise, sizeof noise, "about %.3f, as Embree's curve goes on to its samples", scene->truth.noise_relrmse);
-    int length = snprintf(plot.caption, sizeof plot.caption, "%u × %u pixels. Left and down is better; the yellow band joins the settings that nothing beats in both. ", width, height);
+    int length = snprintf(plot.caption, sizeof plot.caption, "%u × %u pixels. Left and down is better; the yellow band joins the settings that nothing beats in both.%s ", width, height,
+        which == RELRMSE ? " relRMSE: the root of the mean squared error, as a share of the mean of the truth." : which == FLIP_WHOLE ? " FLIP: the difference an eye sees, 0 none, 1 all." : "");
     if (which == FLICKER)
         snprintf(plot.caption + length, sizeof plot.caption - (size_t)length,
             "Flicker is the error of the change between moving frames, as a share of the mean, at %u × %u pixels, while the camera turns by a quarter of a degree a frame; the truth's "

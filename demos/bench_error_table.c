@@ -9,6 +9,7 @@
 #define OTHER "imperfect maps, 1024 lights, one thing changed", 2, false
 #define CLASSIC "accurate maps, 8×8 interleaved", 4, true
 #define HALF "imperfect maps, half resolution", 2, true
+#define HALF_6 "half resolution, 6×6 interleaved, less bounded", 3, true
 #define SAMPLED "one light a pixel, tested by a ray, half resolution", 4, true
 #define RAYS "rays to the lights, 8×8 interleaved", 6, false
 
@@ -51,10 +52,8 @@ static const error_setting table[] = {
     {HALF, "512 lights", "gi=ism half-resolution=true vpl.count=512", false},
     {HALF, "1024 lights", "gi=ism half-resolution=true vpl.count=1024", true},
     {HALF, "2048 lights", "gi=ism half-resolution=true vpl.count=2048", false},
-    {OTHER, "half resolution, 384 lights, 6×6, less bounded",
-        "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=384 vpl.bound=50000 vpl.spread=1", false},
-    {OTHER, "half resolution, 512 lights, 6×6, less bounded",
-        "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=512 vpl.bound=50000 vpl.spread=1", true},
+    {HALF_6, "384 lights", "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=384 vpl.bound=50000 vpl.spread=1", false},
+    {HALF_6, "512 lights", "gi=ism half-resolution=true interleave=6 ism.levels=1 vpl.count=512 vpl.bound=50000 vpl.spread=1", true},
 
     {SAMPLED, "1024 lights", "gi=vpl-sampled half-resolution=true vpl.near=0.08", true},
     {SAMPLED, "4096 lights", "gi=vpl-sampled half-resolution=true vpl.near=0.04 vpl.count=4096", false},

@@ -298,22 +298,31 @@ static void draw_series(drawing* d, const plot_series* series)
 /* The free place nearest to one of the curve's points, the last first. */
 static void draw_name(drawing* d, const plot_series* series)
 {
-    static const double offsets[8][3] = {{10, 4, 0}, {8, -8, 0}, {8, 16, 0}, {0, -11, 0.5}, {0, 20, 0.5}, {-10, 4, 1}, {-8, -8, 1}, {-8, 16, 1}}; /* x, y, share of the width to its left */
+    /* x, y, share of the width to its left; the far ones are joined to their point by a line */
+    static const double offsets[][3] = {{10, 4, 0}, {8, -8, 0}, {8, 16, 0}, {0, -11, 0.5}, {0, 20, 0.5}, {-10, 4, 1}, {-8, -8, 1}, {-8, 16, 1}, {0, -29, 0.5}, {0, 38, 0.5},
+        {8, -29, 0}, {8, 38, 0}, {-8, -29, 1}, {-8, 38, 1}, {0, -47, 0.5}, {0, 56, 0.5}, {8, -47, 0}, {8, 56, 0}, {-8, -47, 1}, {-8, 56, 1}};
+    enum { OFFSETS = sizeof offsets / sizeof offsets[0], NEAR_OFFSETS = 8 };
     static const char* const anchors[3] = {"start", "middle", "end"};
-    double w = plot_text_width(series->name, FONT) * 1.14, best = INFINITY, best_x = 0, best_y = 0, best_share = 0;
+    double w = plot_text_width(series->name, FONT) * 1.14, best = INFINITY, best_x = 0, best_y = 0, best_share = 0, leader_x = NAN, leader_y = NAN;
     for (size_t i = 0; i < series->count; i++) {
         const plot_point* p = &series->points[series->count - 1 - i];
         if (!is_drawn(d, p)) continue;
-        for (int k = 0; k < 8; k++) {
+        for (int k = 0; k < OFFSETS; k++) {
             double x = plot_position(&d->x, p->x) + offsets[k][0] - offsets[k][2] * w, y = plot_position(&d->y, p->y) + offsets[k][1];
             box b = {x, y - 11, x + w, y + 3};
             bool outside = b.x0 < LEFT + 2 || b.x1 > WIDTH - RIGHT + 12 || b.y0 < TOP || b.y1 > HEIGHT - BOTTOM - 2;
-            double cost = overlap(d, b) + 6.0 * (i == 0 ? 0 : i == series->count - 1 ? 1 : 2) + k * 0.5 + (outside ? 1e5 : 0);
-            if (cost < best) best = cost, best_x = x, best_y = y, best_share = offsets[k][2];
+            double cost = overlap(d, b) + 6.0 * (i == 0 ? 0 : i == series->count - 1 ? 1 : 2) + k * 0.5 + (k < NEAR_OFFSETS ? 0 : 8) + (outside ? 1e5 : 0);
+            if (!(cost < best)) continue;
+            best = cost, best_x = x, best_y = y, best_share = offsets[k][2];
+            leader_x = k < NEAR_OFFSETS ? NAN : plot_position(&d->x, p->x);
+            leader_y = plot_position(&d->y, p->y);
         }
     }
     if (!isfinite(best)) return;
     take(d, (box){best_x, best_y - 11, best_x + w, best_y + 3});
+    if (isfinite(leader_x))
+        demo_text_add(d->text, "<path d=\"M%.1f %.1fL%.1f %.1f\" stroke=\"%s\" stroke-width=\"1\"/>\n", leader_x, leader_y + (best_y < leader_y ? -6 : 6),
+            best_x + best_share * w, best_y < leader_y ? best_y + 3 : best_y - 11, plot_text_colours[series->colour]);
     demo_text_add(d->text,
         "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\" font-weight=\"600\" stroke=\"#fff\" stroke-width=\"3.5\" stroke-linejoin=\"round\" paint-order=\"stroke\">",
         best_x + best_share * w, best_y, anchors[(int)(best_share * 2)], plot_text_colours[series->colour]);
