@@ -7,6 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
+enum { INTERRUPTED = 130 }; /* as shells report it */
+
 static volatile sig_atomic_t interrupted;
 static void interrupt(int signal_number)
 {
@@ -45,13 +47,18 @@ static int add_samples(es_context* context, es_reference* reference, uint32_t fr
     return DEMO_OK;
 }
 
+/* The file that can be resumed holds all images; a named one is written alone. */
+static bool can_be_resumed(const demo_options* options, const char* path)
+{
+    size_t length = strlen(path);
+    return length > 4 && !strcmp(path + length - 4, ".exr") && !options->image_count;
+}
+
 static int write_image(const demo_options* options, es_context* context, es_reference* reference, uint32_t frame, const char* name)
 {
     char path[DEMO_PATH_SIZE] = "";
     if (options->out) demo_expand_pattern(options->out, frame, path);
-    size_t length = strlen(path);
-    /* the file that can be resumed holds all images; a named one is written alone */
-    bool all = length > 4 && !strcmp(path + length - 4, ".exr") && !options->image_count;
+    bool all = can_be_resumed(options, path);
     if (all && es_reference_save(reference, path) != ES_OK) return demo_refuse_context(context);
     if (all && !options->hash) return DEMO_OK;
     es_image image;
@@ -72,6 +79,18 @@ static void add_stats(demo_text* text, uint32_t frame, const es_reference_stats*
     else demo_text_add(text, "null}");
 }
 
+/* Who stops a run wants what it has; it has failed only where frames are missing. */
+static int report_interrupt(const demo_options* options, uint32_t frame)
+{
+    char path[DEMO_PATH_SIZE] = "";
+    if (options->out) demo_expand_pattern(options->out, frame, path);
+    bool resumable = can_be_resumed(options, path);
+    fprintf(stderr, "earthshine: interrupted%s%s%s", resumable ? "; --resume " : "", resumable ? path : "", resumable ? " goes on from here" : "");
+    if (frame + 1 < options->end) fprintf(stderr, "; missing are the frames from %u on", frame + 1);
+    fputs("\n", stderr);
+    return frame + 1 < options->end ? INTERRUPTED : DEMO_OK;
+}
+
 static int reference_frames(const demo_options* options, demo_session* session, es_reference* reference, demo_text* stats_text)
 {
     static const char* const radiance[] = {"radiance"};
@@ -89,7 +108,7 @@ static int reference_frames(const demo_options* options, demo_session* session, 
         add_stats(stats_text, frame - options->first, &stats);
         for (size_t i = 0; i < name_count; i++)
             if (write_image(options, session->context, reference, frame, names[i]) != DEMO_OK) return DEMO_BAD_INPUT;
-        if (interrupted) break;
+        if (interrupted) return report_interrupt(options, frame);
     }
     return DEMO_OK;
 }
@@ -108,9 +127,12 @@ static int check_out(const demo_options* options)
 static int check_images(const demo_options* options, uint32_t bounces)
 {
     for (size_t i = 0; i < options->image_count; i++)
-        if (!es_reference_has_image(bounces, options->images[i]))
-            return demo_refuse("--image %s: radiance, emission, direct, indirect and bounce-1 … bounce-%u are known, all but emission also with -error",
-                options->images[i], bounces);
+        if (!es_reference_has_image(bounces, options->images[i])) {
+            char names[64] = "direct and indirect";
+            if (bounces == 1) snprintf(names, sizeof names, "direct, indirect and bounce-1");
+            if (bounces > 1) snprintf(names, sizeof names, "direct, indirect and bounce-1 … bounce-%u", bounces);
+            return demo_refuse("--image %s: radiance, emission, %s are known, all but emission also with -error", options->images[i], names);
+        }
     return DEMO_OK;
 }
 
@@ -142,14 +164,16 @@ int demo_reference(int count, char** arguments)
     if (code == DEMO_OK) {
         struct sigaction action = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
         sigaction(SIGINT, &action, NULL);
+        sigaction(SIGTERM, &action, NULL);
         demo_text_add(&stats, "{\"machine\":");
         demo_text_add_machine(&stats, session.context);
         demo_text_add(&stats, ",\n\"frames\":[");
         code = reference_frames(&options, &session, reference, &stats);
     }
-    if (code == DEMO_OK && options.stats) {
+    if ((code == DEMO_OK || code == INTERRUPTED) && options.stats) {
         demo_text_add(&stats, "],\n\"peak_bytes\":%zu}\n", es_context_peak_bytes(session.context));
-        code = stats.failed ? demo_refuse("%s: out of memory", options.stats) : demo_write_text(options.stats, stats.bytes, stats.size);
+        int written = stats.failed ? demo_refuse("%s: out of memory", options.stats) : demo_write_text(options.stats, stats.bytes, stats.size);
+        if (written != DEMO_OK) code = written;
     }
     demo_text_free(&stats);
     es_reference_destroy(reference);

@@ -191,6 +191,15 @@ refused 'reference.bounces' reference cornell --hash --bounces 65
 refused 'reference.error' reference cornell --hash --error nan
 refused 'setting of render' reference cornell --hash --set exposure=1
 refused 'bounce-1' reference cornell --hash --image bounce-2
+refused 'direct and indirect are known' reference cornell --hash --bounces 0 --image bounce-1
+
+# interrupted: what there is is kept; frames that are missing are a failure
+checks=$((checks + 2))
+timeout --preserve-status -s TERM 4 "$program" reference cornell --size 16x12 --seconds 1000 --out stopped.exr 2>err || fail "exit $? of an interrupted reference"
+grep -q 'interrupted; --resume stopped.exr goes on from here' err || fail 'an interrupted reference does not say how to go on'
+expect 0 reference cornell --size 16x12 --spp 1 --resume stopped.exr --hash
+timeout --preserve-status -s INT 4 "$program" reference cornell --size 16x12 --seconds 1000 --frames 0:2 --out 'stopped%d.exr' 2>err
+[ $? -eq 130 ] || fail 'frames that an interrupt left out are not reported'
 refused 'one frame is expected' reference cornell --hash --frames 0:2 --resume half.exr
 refused 'missing.exr' reference cornell "${ray[@]}" --hash --resume missing.exr
 refused 'another world' reference cornell --size 9x12 --hash --resume half.exr
