@@ -217,6 +217,14 @@ static bool wants_room(const bench_options* options)
     return !options->scene_count;
 }
 
+/* Why a target was not measured. */
+static void say_why(const run* r, const char* no_peers, char* note, size_t size)
+{
+    if (no_peers[0]) snprintf(note, size, "%s", no_peers);
+    else if (!wants_room(r->options)) snprintf(note, size, "the room was not among the scenes");
+    else snprintf(note, size, "%s", r->options->no_peer ? "--no-peer" : "the peers have no truth of the room in this size");
+}
+
 static int write_report(const run* r, error_scene* scenes, size_t count, const char* no_peers)
 {
     bench_report report = {.name = "error", .title = "How wrong each method is, for the time it takes",
@@ -232,7 +240,7 @@ static int write_report(const run* r, error_scene* scenes, size_t count, const c
     demo_text_add(&report.members, "\n]");
     for (size_t i = 0; i < all_count; i++)
         if (all[i].judge != BENCH_NONE && isnan(all[i].judge == BENCH_VALUE_AT_LEAST ? all[i].value : all[i].ratio) && !all[i].note[0])
-            snprintf(all[i].note, sizeof all[i].note, "%s", no_peers[0] ? no_peers : "the room was not among the scenes");
+            say_why(r, no_peers, all[i].note, sizeof all[i].note);
     for (size_t i = 0; i < all_count; i++)
         if (bench_wants(r->options, all[i].id) && (all[i].judge != BENCH_NONE || !isnan(all[i].value))) rows[row_count++] = all[i];
     bench_print(rows, row_count);

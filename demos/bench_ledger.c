@@ -310,7 +310,7 @@ static void add_rows(ledger_rows* all, const ledger_scene* scene, const ledger* 
     add_row(all, scene, "interplay", "", "squared error that goes away only when several causes do", "% of the squared error", ledger_gains_missing(s));
     bench_row* row = add_row(all, scene, "costliest", "", "share of the approximation that costs most", "% of the squared error", ledger_share(s, ledger->costliest));
     snprintf(row->note, sizeof row->note, "%s", causes[ledger->costliest].name);
-    add_row(all, scene, "relative-total", "", "the error with each pixel's in proportion to how bright it is around it", "relRMSE, weighted", ledger_total(&ledger->relative));
+    add_row(all, scene, "relative-total", "", "the error with each pixel's in proportion to how bright it is around it", "weighted relRMSE", ledger_total(&ledger->relative));
     for (size_t i = 0; i < PARTS; i++) {
         row = add_row(all, scene, causes[i].id, "-relative", causes[i].work, "% of the weighted squared error", ledger_share(&ledger->relative, i));
         snprintf(row->note, sizeof row->note, "±%.2g by noise", ledger_share_noise(&ledger->relative, i));
@@ -328,6 +328,7 @@ static void add_rows(ledger_rows* all, const ledger_scene* scene, const ledger* 
 
 static void add_percent(demo_text* text, double value)
 {
+    if (fabs(value) < 0.05) value = 0; /* not -0.0 */
     demo_text_add(text, fabs(value) < 9.95 ? "<td class=\"n\">%.1f\u00a0%%</td>" : "<td class=\"n\">%.0f\u00a0%%</td>", value);
 }
 

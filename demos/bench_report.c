@@ -194,8 +194,10 @@ static void add_section(demo_text* text, const bench_report* report, const bench
     plot_add_escaped(text, machine.bytes ? machine.bytes : "");
     demo_text_add(text, "</p>\n%s", report->figures.bytes ? report->figures.bytes : "");
     if (count) {
-        demo_text_add(text, "<h3>All rows of bench %s</h3>\n", report->name);
+        enum { FEW_ROWS = 24 };
+        demo_text_add(text, count > FEW_ROWS ? "<details><summary>All rows of bench %s</summary>\n" : "<h3>All rows of bench %s</h3>\n", report->name);
         add_rows_table(text, rows, count);
+        if (count > FEW_ROWS) demo_text_add(text, "</details>\n");
     }
     demo_text_add(text, "</section>\n");
     text->failed |= machine.failed;

@@ -54,7 +54,8 @@ void plot_format_value(char text[32], double value)
     double size = fabs(value);
     if (!isfinite(value)) snprintf(text, 32, "–");
     else if (size >= 1e6) snprintf(text, 32, "%.3gM", value / 1e6);
-    else if (size >= 1e5) snprintf(text, 32, "%.0fk", value / 1e3);
+    else if (size >= 99950) snprintf(text, 32, "%.0fk", value / 1e3);
+    else if (size >= 1e4) snprintf(text, 32, "%.3gk", value / 1e3);
     else if (size >= 100) snprintf(text, 32, "%.0f", value);
     else snprintf(text, 32, "%.3g", value);
 }
