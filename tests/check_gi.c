@@ -253,6 +253,40 @@ static void check_upsample(void** state)
     }
 }
 
+/* Far pixels of which the smaller image holds some not at all and the others at another depth: what lies where nothing is seen is left alone,
+ * however much nearer its depth of zero is. */
+static void check_upsample_leaves_the_unseen(void** state)
+{
+    (void)state;
+    enum { WIDTH = 8, HALF = WIDTH / 2, UNSEEN = 2 };
+    es_gbuffer g = new_gbuffer(WIDTH, 1), half = new_gbuffer(HALF, 1);
+    plane source = new_plane(half.stride), result = new_plane(g.stride);
+    for (uint32_t x = 0; x < g.stride; x++) {
+        g.depth[x] = 100.0f;
+        g.normal[x] = es_pack_normal(es_v3(0, 0, 1));
+    }
+    for (uint32_t x = 0; x < half.stride; x++) {
+        half.depth[x] = x < UNSEEN ? 0.0f : 1000.0f;
+        half.normal[x] = es_pack_normal(es_v3(0, 0, 1));
+        at(source)[x] = x < UNSEEN ? 7.0f : 3.0f;
+    }
+    es_upsample_job job = {.gbuffer = &g, .half = &half, .depth_threshold = 0.03f, .normal_threshold = 0.8f, .plane_count = 1, .source = {at(source)}, .result = {at(result)}};
+    for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
+        if (!(es_isa_available_mask() >> isa & 1)) continue;
+        job.depth_threshold = 0.03f;
+        es_gi_kernel_table((es_isa)isa)->upsample(&job, 0, 1);
+        for (uint32_t x = 2 * UNSEEN - 1; x < WIDTH; x++) assert_true(at(result)[x] == 3.0f);
+        /* a threshold of the whole depth would let a depth of zero count */
+        job.depth_threshold = 1.0f;
+        es_gi_kernel_table((es_isa)isa)->upsample(&job, 0, 1);
+        for (uint32_t x = 2 * UNSEEN - 1; x < WIDTH; x++) assert_true(at(result)[x] == 3.0f);
+    }
+    free(source.memory);
+    free(result.memory);
+    free_gbuffer(&g);
+    free_gbuffer(&half);
+}
+
 static void time_all(void)
 {
     enum { COUNT = 1024, SIZE = 128, REPEAT = 3 };
@@ -300,6 +334,7 @@ int main(int argc, char** argv)
         cmocka_unit_test(check_shade),
         cmocka_unit_test(check_filter),
         cmocka_unit_test(check_upsample),
+        cmocka_unit_test(check_upsample_leaves_the_unseen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -19,6 +19,18 @@ VINL void take(const float* row, const columns* c, vf* left, vf* right)
     }
 }
 
+VINL void take_words(const uint32_t* row, const columns* c, vi* left, vi* right)
+{
+    if (c->inner) {
+        vi a = vi_load(row + c->first);
+        *left = __builtin_shufflevector(a, a, 0, 0, 1, 1, 2, 2, 3, 3);
+        *right = __builtin_shufflevector(a, a, 0, 1, 1, 2, 2, 3, 3, 4);
+    } else {
+        *left = vi_gather(row, c->left);
+        *right = vi_gather(row, c->right);
+    }
+}
+
 /* `planes` is a constant at every call */
 VINL void upsample_row(const es_upsample_job* job, uint32_t y, uint32_t planes)
 {
@@ -43,17 +55,20 @@ VINL void upsample_row(const es_upsample_job* job, uint32_t y, uint32_t planes)
             vm counts[4];
             vi nearest = vi_zero();
             for (int i = 0; i < 4; i += 2) {
-                vf depths[2], words[2];
+                vf depths[2];
+                vi words[2];
                 take(half->depth + rows[i / 2], &c, &depths[0], &depths[1]);
-                take((const float*)half->normal + rows[i / 2], &c, &words[0], &words[1]);
+                take_words(half->normal + rows[i / 2], &c, &words[0], &words[1]);
                 for (int j = 0; j < 2; j++) {
                     vf tx, ty, tz, difference = vf_abs(depths[j] - depth);
-                    es_unpack_normal_v(vi_from_bits(words[j]), &tx, &ty, &tz);
+                    es_unpack_normal_v(words[j], &tx, &ty, &tz);
                     vf dot = nx * tx + ny * ty + nz * tz;
-                    counts[i + j] = vm_ge(dot, normal_threshold) & vm_le(difference, limit);
+                    /* where nothing is seen there is no light to take: next to a far wall it would count as near */
+                    vm there = vm_gt(depths[j], zero);
+                    counts[i + j] = there & vm_ge(dot, normal_threshold) & vm_le(difference, limit);
                     count = count + vf_and(counts[i + j], one);
                     vf distance = difference * inverse + (one - dot) * per_normal;
-                    vm nearer = vm_lt(distance, best);
+                    vm nearer = there & vm_lt(distance, best);
                     best = vf_select(nearer, distance, best);
                     nearest = vi_select(nearer, vi_set1(i + j), nearest);
                 }
