@@ -120,8 +120,9 @@ static void test_each_alone(void** state)
             }
             agree(cases[i].name, m[ES_PATH_COMBINED], m[ES_PATH_SURFACES]);
             agree(cases[i].name, m[ES_PATH_LIGHT_VERTICES], m[ES_PATH_SURFACES]);
-            /* an estimate of low variance may lose a little by a second technique (Veach 1997, theorem 9.2) */
-            if (!(m[ES_PATH_COMBINED].error < 1.4 * m[ES_PATH_SURFACES].error)) fail_msg("%s, material %d: error %g, of directions alone %g", cases[i].name, material, m[ES_PATH_COMBINED].error, m[ES_PATH_SURFACES].error);
+            /* an estimate of low variance may lose a little by a second technique (Veach 1997, theorem 9.2); the errors of a sanitizer's fewer samples
+             * are themselves too uncertain to tell */
+            if (FEWER == 1 && !(m[ES_PATH_COMBINED].error < 1.4 * m[ES_PATH_SURFACES].error)) fail_msg("%s, material %d: error %g, of directions alone %g", cases[i].name, material, m[ES_PATH_COMBINED].error, m[ES_PATH_SURFACES].error);
             small_world_destroy(&w);
         }
 }

@@ -717,7 +717,7 @@ static void tear_down(bench* w)
 #define HOLDS(condition, o, ...)                                                                                                       \
     do {                                                                                                                               \
         if (!(condition)) {                                                                                                            \
-            char detail[512];                                                                                                          \
+            char detail[1024];                                                                                                         \
             snprintf(detail, sizeof detail, __VA_ARGS__);                                                                              \
             fail_msg("%s: not so: %s: %s", (o)->name, #condition, detail);                                                             \
         }                                                                                                                              \
