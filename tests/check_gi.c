@@ -276,6 +276,7 @@ static void check_upsample_leaves_the_unseen(void** state)
         job.depth_threshold = 0.03f;
         es_gi_kernel_table((es_isa)isa)->upsample(&job, 0, 1);
         for (uint32_t x = 2 * UNSEEN - 1; x < WIDTH; x++) assert_true(at(result)[x] == 3.0f);
+        for (uint32_t x = 0; x < 2 * UNSEEN - 1; x++) assert_true(at(result)[x] == 0.0f);
         /* a threshold of the whole depth would let a depth of zero count */
         job.depth_threshold = 1.0f;
         es_gi_kernel_table((es_isa)isa)->upsample(&job, 0, 1);

@@ -48,7 +48,7 @@ find_package(earthshine 0.1 REQUIRED)
 add_executable(embed embed.c)
 target_link_libraries(embed PRIVATE earthshine::earthshine)
 CMAKE
-step cmake -S "$work/package" -B "$work/package/build" -DCMAKE_PREFIX_PATH="$work/installed" -DCMAKE_BUILD_TYPE=Release
+step cmake -G Ninja -S "$work/package" -B "$work/package/build" -DCMAKE_PREFIX_PATH="$work/installed" -DCMAKE_BUILD_TYPE=Release
 step cmake --build "$work/package/build"
 step "$work/package/build/embed" "$work/package.png"
 picture "$work/package.png"

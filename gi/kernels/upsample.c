@@ -73,7 +73,8 @@ VINL void upsample_row(const es_upsample_job* job, uint32_t y, uint32_t planes)
                     nearest = vi_select(nearer, vi_set1(i + j), nearest);
                 }
             }
-            vm alone = vm_eq(count, zero);
+            /* none like it: the least unlike of those seen; without any it stays dark, for planes hold anything where nothing is seen */
+            vm alone = vm_eq(count, zero) & vm_lt(best, vf_set1(3e38f));
             for (int i = 0; i < 4; i++) counts[i] |= alone & vi_eq(nearest, vi_set1(i));
             vf share = one / vf_max(count, one);
             for (int i = 0; i < 4; i += 2)
