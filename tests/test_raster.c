@@ -590,6 +590,9 @@ static void check_view(bench* b, scene* sc, es_raster_view view)
 
 static void test_against_rays(void** state)
 {
+#if defined(__SANITIZE_THREAD__)
+    skip(); /* minutes of a brute-force ray caster on one thread */
+#endif
     bench* b = open_bench(2, 0);
     for (int trial = 0; trial < 3; trial++) {
         scene* s = new_scene();
