@@ -197,6 +197,9 @@ static void free_picture(picture* p)
  * go elsewhere, which leaves a spot where their pixel is close to what they hit. */
 static void cuts_of_a_plane(void** state)
 {
+#if defined(__SANITIZE_THREAD__)
+    skip(); /* every method many times over, whose threads do what those of the other tests do */
+#endif
     (void)state;
     for (size_t method = 0; method <= REFERENCE; method++) {
         picture whole = picture_of(WHOLE, method);
@@ -286,6 +289,9 @@ static stress doubled(int copies, bool red_first, float turn)
  * imperfect maps are drawn from fewer of each; their picture is the same but for these. */
 static void duplicated(void** state)
 {
+#if defined(__SANITIZE_THREAD__)
+    skip(); /* every method many times over, whose threads do what those of the other tests do */
+#endif
     (void)state;
     for (size_t method = 0; method <= REFERENCE; method++)
         for (int view = 0; view < 4; view++) {
