@@ -17,8 +17,8 @@ static void fold(const es_filter_job* job, es_filter_scratch* s, int64_t x, int6
 {
     const size_t at = (size_t)(x - begin);
     const int64_t from = folded(x, job->gbuffer->width, job->size);
-    /* what folds to a place beyond the margin is not a tap of any pixel of the block */
-    const bool here = from >= begin && from < end;
+    /* what folds to a place beyond the margin is not a tap of any pixel of the block; -1 may lie within it, and is no place */
+    const bool here = from >= 0 && from >= begin && from < end;
     const size_t copy = here ? (size_t)(from - begin) : 0;
     s->depth_in[at] = here ? s->depth_in[copy] : -1e30f; /* close to no depth */
     for (int k = 0; k < 3; k++) s->normal_in[k][at] = here ? s->normal_in[k][copy] : 0.0f;
