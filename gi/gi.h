@@ -166,7 +166,7 @@ ES_API void es_reference_destroy(es_reference* reference);
  * its camera: its meshes and textures are read, not copied. */
 ES_API es_result es_reference_begin(es_reference* reference, es_world* world);
 /* Adds `samples` samples per pixel, fewer when es_reference_settings.max_samples is reached and none when another limit is; the other limits
- * are looked at between calls, so calls should be short. WRONG_STATE when the world has changed since es_reference_begin. */
+ * are looked at between calls, so calls should be short. WRONG_STATE when the world has changed since es_reference_begin, and past 2^26 samples. */
 ES_API es_result es_reference_add(es_reference* reference, uint32_t samples);
 
 typedef struct es_reference_stats {
