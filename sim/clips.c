@@ -137,13 +137,13 @@ static void sample(const es_clip_channel* channel, double t, float value[4])
     }
 }
 
-void es_clips_play(es_world* world)
+void es_clips_play(es_world* world, double time)
 {
     const es_slots* slots = &world->slots[ES_OBJECT_CLIP];
     for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
         const es_clip_object* clip = es_slots_at(slots, slot);
         if (!clip || !clip->playing) continue;
-        double t = world->time - clip->start, duration = clip->duration;
+        double t = time - clip->start, duration = clip->duration;
         if (duration > __builtin_fabs(t) * 0x1p-52) { /* shorter ones have no phase that a double could hold */
             t -= duration * (double)(int64_t)(t / duration);
             if (t < 0) t += duration;

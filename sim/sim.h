@@ -32,7 +32,12 @@ typedef struct es_clip { uint32_t id; } es_clip;
 
 typedef struct es_world_settings {
     uint32_t triangles;      /* built-in scenes: triangles to aim at; 0: the scene's own number */
-    float speed;             /* of time, 0 … 100 */
+    float speed;             /* of time, 0 … 100; below 1 slow motion */
+    float step;              /* seconds of one step of bodies and cloth, 1e-4 … 0.1 */
+    uint32_t substeps;       /* parts it is solved in, 1 … 64 */
+    bool interpolate;        /* show bodies and cloth between two steps, where time is; off: as of the last step */
+    bool sleep;              /* bodies and cloth at rest fall asleep */
+    es_vec3 gravity;         /* m/s², each within 1000 */
     uint32_t camera;         /* which of the file's or scene's cameras, counted from 0 */
     uint32_t clip;           /* which clip plays: 0 all that do not touch the same node, n the n-th */
     bool default_light;      /* files without lights get one */
@@ -59,8 +64,18 @@ ES_API es_result es_world_import_gltf(es_context* context, const char* path, con
 /* A built-in scene's name, or else a file. */
 ES_API es_result es_world_open(es_context* context, const char* scene_or_path, const es_world_settings* settings, es_world** world);
 
-/* Advances by dt seconds (0 … 10) times settings.speed: the present pose becomes the last one; clips, then the step function
- * move things; transforms, views and marks are updated. dt = 0 keeps the pose and ends all motion. */
+ES_API es_world_settings es_world_get_settings(const es_world* world);
+/* Takes effect with the next step and is part of the saved state; triangles, camera, clip and default_light are read when a scene or file is
+ * opened and stay as they were. SETTING_VALUE when one is outside its range; nothing is changed then. */
+ES_API es_result es_world_configure(es_world* world, const es_world_settings* settings);
+
+/* Advances by dt seconds (0 … 10) times settings.speed: the present pose becomes the last one; bodies and cloth make as many steps of
+ * settings.step as it takes to reach the new time, clips and motions go there, then the step function moves things; transforms, views
+ * and marks are updated. dt = 0 keeps the pose and ends all motion.
+ *
+ * Bodies and cloth see clips and motions as of each of their own steps, so that what they do does not depend on how time is cut into
+ * frames; shown are they as of the new time, between the two steps around it (Fiedler's fixed timestep, without its frame of delay: the
+ * step ahead is made first). The cost grows with dt × speed / step, which nothing limits. */
 ES_API es_result es_world_step(es_world* world, float dt);
 ES_API double es_world_time(const es_world* world);
 /* Called by es_world_step after the clips, with the new time. It may use every function of the world but step and destroy. */

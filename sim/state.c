@@ -210,15 +210,28 @@ static void visit_environment(es_world* world, state_io* io)
 
 static void visit_world(es_world* world, state_io* io)
 {
-    double time = world->time;
+    double time = world->time, fixed_base = world->fixed_base;
+    uint64_t fixed_count = world->fixed_count;
+    es_world_settings settings = world->settings, resolved;
     bool stepped = world->stepped;
     es_camera active = world->active_camera;
     transfer(io, &time, sizeof time);
+    transfer(io, &fixed_base, sizeof fixed_base);
+    transfer(io, &fixed_count, sizeof fixed_count);
+    visit_floats(io, &settings.speed, 1);
+    visit_floats(io, &settings.step, 1);
+    visit_u32(io, &settings.substeps);
+    visit_flag(io, &settings.interpolate);
+    visit_flag(io, &settings.sleep);
+    visit_floats(io, &settings.gravity.x, 3);
     visit_flag(io, &stepped);
     visit_u32(io, &active.id);
-    if (reading(io) && io->good) io->good = time >= 0 && time <= 1e12 && (!active.id || es_slots_get(&world->slots[ES_OBJECT_CAMERA], active.id));
+    if (reading(io) && io->good) io->good = time >= 0 && time <= 1e12 && fixed_base >= 0 && fixed_base <= 1e12 && fixed_count <= 1ull << 53 && es_world_settings_resolve(world->context, &settings, &resolved) == ES_OK && (!active.id || es_slots_get(&world->slots[ES_OBJECT_CAMERA], active.id));
     if (io->mode == APPLY && io->good) {
         world->time = time;
+        world->fixed_base = fixed_base;
+        world->fixed_count = fixed_count;
+        world->settings = settings;
         world->stepped = stepped;
         world->active_camera = active;
         world->camera_dirty = world->nodes_moving = world->list_dirty = true;
@@ -262,7 +275,7 @@ static uint64_t content_signature(const es_world* world)
 }
 
 typedef struct state_header { char magic[8]; uint64_t content, payload; } state_header;
-static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '3'};
+static const char magic[8] = {'E', 'S', 'W', 'O', 'R', 'L', 'D', '4'};
 
 es_result es_world_save(const es_world* world, void* buffer, size_t* size)
 {

@@ -126,7 +126,7 @@ void es_world_set_step_function(es_world* world, es_world_step_function function
     world->step_user = user;
 }
 
-/* ---- stepping ------------------------------------------------------------------------------------------------------------------ */
+/* ---- refreshing ---------------------------------------------------------------------------------------------------------------- */
 
 /* Getters are const to their callers; what they compute late is the same whenever it is computed. */
 void es_world_refresh(const es_world* world)
@@ -162,27 +162,6 @@ void es_world_settle(es_world* world)
         memcpy(camera->previous_position, es_node_position(world, camera->desc.node), sizeof camera->previous_position);
         world->camera_dirty |= world->camera_moving;
     }
-}
-
-es_result es_world_step(es_world* world, float dt)
-{
-    if (!world) return ES_INVALID_ARGUMENT;
-    if (world->in_step) return es_misuse(world->context, ES_WRONG_STATE, "es_world_step: called from a step function");
-    if (!es_within(dt, 0, 10)) return es_fail(world->context, ES_INVALID_ARGUMENT, "es_world_step: dt is %g; it must lie in 0 … 10 seconds", (double)dt);
-    es_world_settle(world);
-    world->stepped = true;
-    double advance = (double)dt * (double)world->settings.speed;
-    if (advance > 0) {
-        world->time += advance;
-        world->in_step = true;
-        es_fp_environment environment = es_fp_enter();
-        es_clips_play(world);
-        es_fp_leave(environment);
-        if (world->step_function) world->step_function(world, world->step_user, world->time, (float)advance);
-        world->in_step = false;
-    }
-    es_world_refresh(world);
-    return ES_OK;
 }
 
 es_world_revisions es_world_get_revisions(const es_world* world)
@@ -230,7 +209,7 @@ es_result es_world_finish_opening(es_world* world)
     }
     choose_clips(world);
     es_fp_environment environment = es_fp_enter();
-    es_clips_play(world);
+    es_clips_play(world, world->time);
     es_fp_leave(environment);
     es_world_settle(world);
     es_world_refresh(world);

@@ -75,6 +75,8 @@ struct es_world {
     es_world_settings settings;
     es_slots slots[ES_OBJECT_KINDS];
     double time;
+    double fixed_base;             /* dynamics stand at fixed_base + fixed_count × settings.step seconds, at or after `time` */
+    uint64_t fixed_count;
     bool in_step;
     bool stepped;                  /* before the first step there is no last frame */
     es_world_step_function step_function;
@@ -146,7 +148,8 @@ es_mat4 es_relative_matrix(const es_world* world, const es_mat4* matrix, const d
 /* The transform with zero-initialised parts replaced and the rotation made unit; false when a number is out of range. */
 bool es_transform_resolve(const es_transform* transform, es_transform* resolved);
 
-void es_clips_play(es_world* world);
+/* Poses what playing clips move as it is at `time`. */
+void es_clips_play(es_world* world, double time);
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
 void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
@@ -155,6 +158,9 @@ bool es_camera_desc_resolve(es_world* world, const es_camera_desc* desc, es_came
 bool es_environment_numbers_valid(const float radiance[3], float rotation);
 void es_environment_free(es_world* world);
 bool es_light_desc_resolve(es_world* world, const es_light_desc* desc, es_light_desc* resolved);
+
+/* Where bodies and cloth stand, seconds. */
+double es_fixed_time(const es_world* world);
 
 /* Last act of opening a scene or file: chooses camera and clips by the settings, poses the clips at time 0, makes that
  * pose the last one too. SETTING_VALUE when the settings name a camera or clip that is not there. */
