@@ -206,6 +206,34 @@ typedef struct es_clip_desc { const char* name; uint32_t channel_count; const es
 ES_API es_result es_world_add_clip(es_world* world, const es_clip_desc* desc, es_clip* clip);
 ES_API es_result es_world_play_clip(es_world* world, es_clip clip, bool play);
 
+/* ---- shapes of bodies --------------------------------------------------------------------------------------------------------------------------- */
+
+typedef enum es_shape_type { ES_SHAPE_SPHERE, ES_SHAPE_BOX, ES_SHAPE_CAPSULE, ES_SHAPE_HULL, ES_SHAPE_MESH } es_shape_type;
+
+/* What a body is made of, in the body's frame (its node's axes), and what queries are asked with. Lengths are metres, between 1e-4 and
+ * 1e5; a shape reaches at most 1e5 m from its body's origin. Start with es_default_shape_desc. */
+typedef struct es_shape_desc {
+    es_shape_type type;
+    es_vec3 position;         /* of its centre (hull, mesh: of its points' origin) in the body's frame */
+    es_quat rotation;         /* all zero: none */
+    float radius;             /* sphere, capsule; box: how much of its half extents, at most the smallest, is rounding; hull: added all around it */
+    float half_height;        /* capsule: half the distance between the centres of its caps, along its y; 0 … */
+    es_vec3 half_extents;     /* box */
+    const float* points;      /* hull: 3 floats each, at least four that span a volume; NULL: the vertices of `mesh` */
+    uint32_t point_count;     /* hulls keep the 64 corners that reach out farthest */
+    es_mesh mesh;             /* hull without points: its vertices as they are now; mesh: its triangles, for static and kinematic bodies
+                               * only, solid on both sides, those without area left out */
+    es_vec3 scale;            /* hull, mesh: of the points, before rotation; all zero: 1 */
+    float density;            /* kg/m³; 0: 1000 */
+    float friction;           /* 0 … 100, of two shapes their geometric mean; negative: 0.6 */
+    float restitution;        /* 0 … 1, of two shapes the larger; negative: 0 */
+    float rolling_resistance; /* m, 0 … : torque against rolling per newton of normal force */
+    bool sensor;              /* reports who enters and leaves, pushes nothing */
+    uint32_t category, mask;  /* two shapes meet when each one's category is in the other's mask; category 0: 1, mask 0: all */
+} es_shape_desc;
+/* A box of 1 m with every default written out. */
+ES_API es_shape_desc es_default_shape_desc(void);
+
 /* ---- destroying and enumerating ----------------------------------------------------------------------------------------------------------------- */
 
 /* Refused (WRONG_STATE) while something that exists refers to the object. */
