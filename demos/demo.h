@@ -56,8 +56,11 @@ const char* demo_method_name(uint32_t method);
 
 /* ---- settings (settings.c) --------------------------------------------------------------------------------------- */
 
-/* Applies --size, --gi, --no-skip and every --set. One of `renderer` and `reference` is NULL: its settings are refused. */
+/* The scene's own settings, then --size, --gi, --no-skip and every --set. One of `renderer` and `reference` is NULL: its settings are refused. */
 int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer,
+    es_reference_settings* reference);
+/* What es_scene_settings recommends, over what the structs hold; `renderer` or `reference` is NULL, and what is not theirs is left out. */
+int demo_apply_scene_settings(es_context* context, const char* scene, es_world_settings* world, es_renderer_settings* renderer,
     es_reference_settings* reference);
 int demo_settings(int count, char** arguments);
 int demo_scenes(int count, char** arguments);

@@ -6,7 +6,7 @@
 
 static const char usage[] =
     "usage:\n"
-    "  earthshine scenes                                list the built-in scenes\n"
+    "  earthshine scenes [--settings]                   list the built-in scenes, and the settings each is shown with\n"
     "  earthshine play   [SCENE|FILE.gltf|FILE.glb]     a window; H lists the keys\n"
     "  earthshine render SCENE|FILE --out PATTERN       headless: .exr .png .hdr; %04d takes the frame number\n"
     "             --size WxH --frames A:B (B not included; default 0:1) --fps N (30) --threads N (all)\n"

@@ -37,27 +37,59 @@ static int refuse_unknown(const char* name)
     return demo_refuse("--set %s: no such setting; `earthshine settings` lists all", name);
 }
 
+typedef struct setting_targets {
+    es_context* context;
+    es_world_settings* world;
+    es_renderer_settings* renderer;   /* or */
+    es_reference_settings* reference;
+} setting_targets;
+
+/* One key=value; `origin` begins a refusal. */
+static int apply_set(const setting_targets* to, const char* origin, const char* text)
+{
+    char name[128];
+    const char* equals = strchr(text, '=');
+    snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
+    es_result result;
+    if (world_has(name)) {
+        result = es_world_settings_set(to->context, to->world, name, equals + 1);
+    } else if (renderer_has(name)) {
+        if (!to->renderer) return demo_refuse("%s %s: is a setting of render and play, not of reference", origin, name);
+        result = es_renderer_settings_set(to->context, to->renderer, name, equals + 1);
+    } else if (reference_has(name)) {
+        if (!to->reference) return demo_refuse("%s %s: is a setting of reference, not of render and play", origin, name);
+        result = es_reference_settings_set(to->context, to->reference, name, equals + 1);
+    } else {
+        return refuse_unknown(name);
+    }
+    return result == ES_OK ? DEMO_OK : demo_refuse_context(to->context);
+}
+
+int demo_apply_scene_settings(es_context* context, const char* scene, es_world_settings* world, es_renderer_settings* renderer,
+    es_reference_settings* reference)
+{
+    const setting_targets to = {context, world, renderer, reference};
+    for (const char* const* text = es_scene_settings(scene); *text; text++) {
+        char bounces[64];
+        const char* set = *text;
+        /* the truth has as many bounces as the picture it judges; how the picture is made means nothing to it */
+        if (reference && !strncmp(set, "bounces=", 8)) {
+            snprintf(bounces, sizeof bounces, "reference.%s", set);
+            set = bounces;
+        } else if (!renderer && strncmp(set, "world.", 6) != 0) {
+            continue;
+        }
+        if (apply_set(&to, scene, set) != DEMO_OK) return DEMO_BAD_INPUT;
+    }
+    return DEMO_OK;
+}
+
 static int apply_sets(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer,
     es_reference_settings* reference)
 {
-    for (size_t i = 0; i < options->set_count; i++) {
-        char name[128];
-        const char* equals = strchr(options->sets[i], '=');
-        snprintf(name, sizeof name, "%.*s", (int)(equals - options->sets[i]), options->sets[i]);
-        es_result result;
-        if (world_has(name)) {
-            result = es_world_settings_set(context, world, name, equals + 1);
-        } else if (renderer_has(name)) {
-            if (!renderer) return demo_refuse("--set %s: is a setting of render and play, not of reference", name);
-            result = es_renderer_settings_set(context, renderer, name, equals + 1);
-        } else if (reference_has(name)) {
-            if (!reference) return demo_refuse("--set %s: is a setting of reference, not of render and play", name);
-            result = es_reference_settings_set(context, reference, name, equals + 1);
-        } else {
-            return refuse_unknown(name);
-        }
-        if (result != ES_OK) return demo_refuse_context(context);
-    }
+    const setting_targets to = {context, world, renderer, reference};
+    for (size_t i = 0; i < options->set_count; i++)
+        if (apply_set(&to, "--set", options->sets[i]) != DEMO_OK) return DEMO_BAD_INPUT;
     return DEMO_OK;
 }
 
@@ -74,15 +106,14 @@ int demo_apply_settings(es_context* context, const demo_options* options, es_wor
     es_reference_settings* reference)
 {
     *world = es_default_world_settings();
+    if (renderer) *renderer = es_default_renderer_settings();
+    if (reference) *reference = es_default_reference_settings();
+    if (options->scene && demo_apply_scene_settings(context, options->scene, world, renderer, reference) != DEMO_OK) return DEMO_BAD_INPUT;
     if (renderer) {
-        *renderer = es_default_renderer_settings();
         if (options->method >= 0) renderer->method = (uint32_t)options->method;
         if (options->no_skip) renderer->skip = false;
     }
-    if (reference) {
-        *reference = es_default_reference_settings();
-        if (apply_reference_options(context, options, reference) != DEMO_OK) return DEMO_BAD_INPUT;
-    }
+    if (reference && apply_reference_options(context, options, reference) != DEMO_OK) return DEMO_BAD_INPUT;
     uint32_t *width = renderer ? &renderer->width : &reference->width, *height = renderer ? &renderer->height : &reference->height;
     if (options->size_given) *width = options->width, *height = options->height;
     if (apply_sets(context, options, world, renderer, reference) != DEMO_OK) return DEMO_BAD_INPUT;
@@ -127,8 +158,14 @@ int demo_settings(int count, char** arguments)
 
 int demo_scenes(int count, char** arguments)
 {
-    if (expect_nothing("scenes", count, arguments) != DEMO_OK) return DEMO_BAD_INPUT;
-    for (size_t i = 0; i < es_scene_count(); i++) printf("%-12s %s\n", es_scene_name(i), es_scene_description(i));
+    bool settings = count > 0 && (!strcmp(arguments[0], "-v") || !strcmp(arguments[0], "--settings"));
+    if (expect_nothing("scenes", count - settings, arguments + settings) != DEMO_OK) return DEMO_BAD_INPUT;
+    for (size_t i = 0; i < es_scene_count(); i++) {
+        const char* name = es_scene_name(i);
+        printf("%-12s %s\n", name, es_scene_description(i));
+        if (!settings) continue;
+        for (const char* const* text = es_scene_settings(name); *text; text++) printf("%-12s --set %s\n", "", *text);
+    }
     return DEMO_OK;
 }
 

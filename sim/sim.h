@@ -56,6 +56,9 @@ ES_API es_context* es_world_context(const es_world* world);
 ES_API size_t es_scene_count(void);
 ES_API const char* es_scene_name(size_t index);
 ES_API const char* es_scene_description(size_t index);
+/* Settings that show a scene at its best: texts key=value, of es_world_settings_set and of the light's es_renderer_settings_set, NULL after
+ * the last; none for a name that is not built in. es_world_create_scene does not apply them: programs do, before what their user asks for. */
+ES_API const char* const* es_scene_settings(const char* name);
 /* settings NULL: defaults. SCENE_UNKNOWN names the nearest. */
 ES_API es_result es_world_create_scene(es_context* context, const char* name, const es_world_settings* settings, es_world** world);
 /* .gltf or .glb by content. What is left out is warned of; what cannot be shown at all is refused. A file without a camera gets

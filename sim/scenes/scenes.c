@@ -5,6 +5,9 @@
 
 #include "platform/settings.h"
 
+/* Settings a scene is shown best with stand behind its builder: SETTINGS("temporal=true", "bounces=3"). */
+#define SETTINGS(...) ((const char* const[]){__VA_ARGS__, NULL})
+
 static const es_scene scenes[] = {
     {"cornell", "a Cornell box with four moving objects under a moving spot light (3,372 triangles)", es_scene_cornell},
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
@@ -20,6 +23,13 @@ static const es_scene* find(const char* name)
     for (size_t i = 0; i < es_scene_count(); i++)
         if (strcmp(scenes[i].name, name) == 0) return &scenes[i];
     return NULL;
+}
+
+const char* const* es_scene_settings(const char* name)
+{
+    static const char* const none[] = {NULL};
+    const es_scene* scene = name ? find(name) : NULL;
+    return scene && scene->settings ? scene->settings : none;
 }
 
 es_result es_world_create_scene(es_context* context, const char* name, const es_world_settings* settings, es_world** world)

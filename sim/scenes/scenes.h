@@ -9,6 +9,7 @@ typedef struct es_scene {
     const char* description;
     /* Fills an empty world; `triangles` is what to aim at, 0 the scene's own number. */
     es_result (*build)(es_world* world, uint32_t triangles);
+    const char* const* settings; /* what es_scene_settings gives: key=value …, NULL after the last; NULL: none */
 } es_scene;
 
 es_result es_scene_cornell(es_world* world, uint32_t triangles);
