@@ -5,9 +5,7 @@
 
 #include "gi/classic.h"
 #include "gi/direct.h"
-#include "gi/near_light.h"
-#include "gi/surface.h"
-#include "gi/vpl_visibility.h"
+#include "gi/indirect.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/settings.h"
@@ -167,24 +165,6 @@ static es_result reserve_vpls(es_renderer* renderer, uint32_t count)
     if (!renderer->vpls) return es_context_last_result(context);
     renderer->vpl_capacity = count;
     return ES_OK;
-}
-
-/* ---- what the frame is made from -------------------------------------------------------------------------------------------- */
-
-/* Textures may make any roughness of it. */
-static bool material_has_lobe(const es_material_desc* m)
-{
-    es_surface surface = es_surface_of(m->model, es_v3(1, 1, 1), m->metallic, m->model == ES_SURFACE_PHONG ? m->exponent : m->roughness, m->specular);
-    return es_surface_has_lobe(&surface) || (m->model == ES_SURFACE_METALLIC_ROUGHNESS && m->metallic_roughness_texture.image);
-}
-
-static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
-{
-    for (uint32_t i = 0; i < renderer->vpl_count; i++)
-        if (renderer->vpls[i].glossy) return true;
-    for (uint32_t i = 0; i < list->instance_count; i++)
-        if (material_has_lobe(&list->materials[list->instances[i].material])) return true;
-    return false;
 }
 
 /* ---- passes -------------------------------------------------------------------------------------------------------------------- */
@@ -394,151 +374,12 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
     return ES_OK;
 }
 
-/* 1/m², in place of the bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
-#define UNBOUNDED 1e18f
-
-/* What the indirect light is shaded and filtered on. */
-static const es_gbuffer* shaded_gbuffer(const es_renderer* r) { return r->settings.half_resolution ? &r->half : &r->gbuffer; }
-
-/* At every pixel, whatever the setting of the pattern. */
-static bool every_light(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED && !s->traced_interleave; }
-
-static es_result pass_shading(es_renderer* r, const es_frame_inputs* in)
-{
-    es_plan* plan = &r->plan;
-    const es_renderer_settings* s = &r->settings;
-    if (in->no_indirect || !r->vpl_count) {
-        es_plan_not_needed(plan, ES_PASS_SHADING, in->no_indirect ? in->no_indirect : "the lights reach nothing");
-        return ES_OK;
-    }
-    r->has_specular = frame_has_lobes(r, in->list);
-    es_plan_begin(plan, ES_PASS_SHADING);
-    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
-    es_plan_reads_pass(plan, ES_PASS_VPLS);
-    es_plan_reads_pass(plan, ES_PASS_ISM);
-    es_plan_reads_pass(plan, ES_PASS_CLASSIC);
-    es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
-    const bool sampled = s->method == ES_GI_VPL_SAMPLED, traced = sampled || s->method == ES_GI_VPL_TRACED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
-    const float near = s->traced_bias == ES_TRACED_BOUNDED ? s->near_distance * in->extent : 0.0f;
-    const uint32_t interleave = every_light(s) ? 1 : s->interleave;
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near, (float)s->seed};
-    es_plan_reads(plan, numbers, sizeof numbers);
-    if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
-    const es_gbuffer* shaded = shaded_gbuffer(r);
-    es_result result = s->half_resolution ? es_gbuffer_halve(r->context, &r->gbuffer, &r->half) : ES_OK;
-    if (!result) result = es_planes_resize(r->context, &r->irradiance, shaded);
-    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->specular, shaded);
-    if (result) return result;
-    es_shade_job job = {.gbuffer = shaded, .rays = s->half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .maps = r->maps.texels, .map_size = r->maps.size,
-        .far_distance = r->maps.far_distance, .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = es_geometry_bound(s, in), .interleave = interleave};
-    for (int k = 0; k < 3; k++) {
-        job.irradiance[k] = r->irradiance.at[k];
-        job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;
-    }
-    es_arena_reset(&r->arena);
-    es_vpl_visibility visibility;
-    if (traced) {
-        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, r->vpls, r->vpl_count, in->extent, &visibility);
-        job.visibility = &visibility.shade;
-        job.maps = NULL;
-    }
-    es_near_light near_light;
-    if (near > 0.0f) {
-        near_light = es_near_light_of(&r->trace_scene, near, in->extent * ES_RAY_OFFSET_SHARE);
-        job.near = &near_light.shade;
-        job.geometry_bound = 1.0f / (near * near);
-        job.spread = 0.0f;
-    }
-    if (unbounded) {
-        job.geometry_bound = UNBOUNDED;
-        job.spread = job.lobe_roughness = 0.0f;
-    }
-    if (!result) result = es_shade(r->context, &r->arena, &job);
-    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)shaded->width * shaded->height * r->vpl_count / (interleave * interleave));
-    return result;
-}
-
-static es_result pass_filter(es_renderer* r, const es_frame_inputs* in)
-{
-    es_plan* plan = &r->plan;
-    const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
-    r->filter_passes = why ? 0 : s->filter_passes;
-    if (why) {
-        es_plan_not_needed(plan, ES_PASS_FILTER, why);
-        return ES_OK;
-    }
-    es_plan_begin(plan, ES_PASS_FILTER);
-    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
-    es_plan_reads_pass(plan, ES_PASS_SHADING);
-    float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
-    es_plan_reads(plan, numbers, sizeof numbers);
-    if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
-    const es_gbuffer* shaded = shaded_gbuffer(r);
-    es_result result = ES_OK;
-    for (uint32_t i = 0; i < 2 && i < s->filter_passes && !result; i++) {
-        result = es_planes_resize(r->context, &r->filtered_irradiance[i], shaded);
-        if (!result && r->has_specular) result = es_planes_resize(r->context, &r->filtered_specular[i], shaded);
-    }
-    const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
-    for (uint32_t pass = 0; pass < s->filter_passes && !result; pass++) {
-        es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
-        for (int k = 0; k < 3; k++) {
-            job.source[k] = irradiance->at[k];
-            job.result[k] = r->filtered_irradiance[pass % 2].at[k];
-            job.source[k + 3] = specular->at[k];
-            job.result[k + 3] = r->filtered_specular[pass % 2].at[k];
-        }
-        irradiance = &r->filtered_irradiance[pass % 2];
-        specular = &r->filtered_specular[pass % 2];
-        es_arena_reset(&r->arena);
-        result = es_filter_geometry_aware(r->context, &r->arena, &job);
-    }
-    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)shaded->width * shaded->height * s->filter_passes);
-    return result;
-}
-
-static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : &r->irradiance; }
-static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : &r->specular; }
-
-static es_result pass_upsample(es_renderer* r, const es_frame_inputs* in)
-{
-    es_plan* plan = &r->plan;
-    const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->half_resolution ? "half-resolution is off" : NULL;
-    if (why) {
-        es_plan_not_needed(plan, ES_PASS_UPSAMPLE, why);
-        return ES_OK;
-    }
-    es_plan_begin(plan, ES_PASS_UPSAMPLE);
-    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
-    es_plan_reads_pass(plan, ES_PASS_SHADING);
-    es_plan_reads_pass(plan, ES_PASS_FILTER);
-    float numbers[] = {s->filter_depth, s->filter_normal, r->has_specular};
-    es_plan_reads(plan, numbers, sizeof numbers);
-    if (!es_plan_run(plan, ES_PASS_UPSAMPLE)) return ES_OK;
-    es_result result = es_planes_resize(r->context, &r->upsampled_irradiance, &r->gbuffer);
-    if (!result && r->has_specular) result = es_planes_resize(r->context, &r->upsampled_specular, &r->gbuffer);
-    if (result) return result;
-    es_upsample_job job = {.gbuffer = &r->gbuffer, .half = &r->half, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
-    for (int k = 0; k < 3; k++) {
-        job.source[k] = filtered_irradiance(r)->at[k];
-        job.result[k] = r->upsampled_irradiance.at[k];
-        job.source[k + 3] = filtered_specular(r)->at[k];
-        job.result[k + 3] = r->upsampled_specular.at[k];
-    }
-    es_upsample(r->context, &job);
-    es_plan_done(plan, ES_PASS_UPSAMPLE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
-    return ES_OK;
-}
-
 es_compose_job es_renderer_compose_job(const es_renderer* r)
 {
     const es_renderer_settings* s = &r->settings;
     es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure), .white = s->white, .tone_map = s->tone_map};
-    const bool half = r->plan.valid[ES_PASS_UPSAMPLE];
-    const es_planes* irradiance = half ? &r->upsampled_irradiance : filtered_irradiance(r);
-    const es_planes* specular = half ? &r->upsampled_specular : filtered_specular(r);
+    const es_planes* irradiance = es_indirect_irradiance(r);
+    const es_planes* specular = es_indirect_specular(r);
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];
@@ -589,6 +430,7 @@ static es_result render(es_renderer* r, es_world* world)
     const es_renderer_settings* s = &r->settings;
     in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
 
+    r->frame = (es_frame_settings){*s, in.extent};
     es_plan_begin_frame(&r->plan, s->skip);
     result = pass_visibility(r, &in);
     if (!result) result = pass_light_views(r, &in);
@@ -596,10 +438,10 @@ static es_result render(es_renderer* r, es_world* world)
     if (!result) result = pass_maps(r, &in);
     if (!result) result = es_pass_hierarchy(r, &in, world);
     if (!result) result = pass_direct(r, &in);
-    if (!result) result = pass_shading(r, &in);
+    if (!result) result = es_pass_shading(r, &in);
     if (!result) result = es_pass_compensation(r, &in);
-    if (!result) result = pass_filter(r, &in);
-    if (!result) result = pass_upsample(r, &in);
+    if (!result) result = es_pass_filter(r, &in);
+    if (!result) result = es_pass_upsample(r, &in);
     if (!result) pass_compose(r);
     return result;
 }

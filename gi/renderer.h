@@ -17,9 +17,13 @@
 /* Three planes of floats, rows of the G-buffer's stride. */
 typedef struct es_planes { float* at[3]; void* memory; size_t bytes; } es_planes;
 
+/* What the last frame was, or this one is being, rendered with: images are made of it after the settings have changed. */
+typedef struct es_frame_settings { es_renderer_settings settings; float extent; } es_frame_settings;
+
 struct es_renderer {
     es_context* context;
     es_renderer_settings settings;
+    es_frame_settings frame;
     es_plan plan;
     es_frame_stats stats;
     uint64_t frames;

@@ -159,13 +159,16 @@ es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job
         es_result result = place_lights(context, arena, job, lights);
         if (result) return result;
     }
-    for (uint32_t v = 0; v < job->vpl_count && !job->sampled; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread, job->lobe_roughness);
+    for (uint32_t v = 0; v < job->vpl_count - job->dark_count && !job->sampled; v++) lights[v] = light_of(&job->vpls[v], (float)(n * n), job->spread, job->lobe_roughness);
 
     shade_loop loop = {.job = job, .lights = lights, .batches = batches, .kernels = es_gi_kernel_table(es_context_isa(context))};
     uint32_t columns = (width + n - 1) / n, rows = (height + n - 1) / n;
     loop.rows = ES_SHADE_LANES / ES_SHADE_COLUMNS;
     loop.columns_of_blocks = (columns + ES_SHADE_COLUMNS - 1) / ES_SHADE_COLUMNS;
     uint32_t rectangles = loop.columns_of_blocks * ((rows + loop.rows - 1) / loop.rows);
+    for (uint32_t v = 0; v < job->vpl_count && job->sampled; v++)
+        if (lights[v].record >= job->vpl_count - job->dark_count)
+            for (int k = 0; k < 3; k++) lights[v].color[k] = lights[v].power[k] = 0.0f;
     es_parallel_for(context, rectangles * n, 1, shade_blocks, &loop);
     return ES_OK;
 }

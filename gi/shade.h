@@ -59,6 +59,7 @@ typedef struct es_shade_job {
     es_pixel_rays rays;
     const es_vpl_record* vpls;
     uint32_t vpl_count;
+    uint32_t dark_count;           /* the last so many records send nothing; where one is sampled they are chosen as if they did */
     const uint16_t* maps;          /* map v at maps + v · map_size²; NULL: everything sees everything */
     const es_shade_visibility* visibility; /* in place of maps; NULL: by the maps */
     uint32_t map_size;

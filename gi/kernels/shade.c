@@ -384,6 +384,7 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
 {
     const uint32_t n = job->interleave, lanes = p->lanes * p->rows;
     const size_t map_texels = (size_t)job->map_size * job->map_size;
+    const uint32_t lit = job->vpl_count - job->dark_count;
     bool lobes = false;
     gather(job, p, batch, job->specular[0] != NULL, &lobes);
     if (job->sampled) {
@@ -393,7 +394,7 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         for (uint32_t v = phase; v < job->vpl_count && !glossy; v += n * n) glossy = lights[v].glossy;
         apply_chosen(job, lights, batch, lanes, glossy);
     }
-    for (uint32_t v = phase; v < job->vpl_count && !job->sampled; v += n * n) {
+    for (uint32_t v = phase; v < lit && !job->sampled; v += n * n) {
         const es_shade_light* light = &lights[v];
         const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
         const enum shadow shadow = map ? SHADOW_BY_MAP : NO_SHADOW;
@@ -401,7 +402,7 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         else if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, true);
         else if (lobes) apply_light(job, light, map, batch, lanes, shadow, false, true);
         else if (light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, false);
-        else if (map) apply_diffuse(job, light, map, v + n * n < job->vpl_count ? map + n * n * map_texels : map, batch, lanes, true);
+        else if (map) apply_diffuse(job, light, map, v + n * n < lit ? map + n * n * map_texels : map, batch, lanes, true);
         else apply_diffuse(job, light, NULL, NULL, batch, lanes, false);
     }
     if (job->near) job->near->add(job->near, batch, lanes, lobes);

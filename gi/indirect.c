@@ -1,0 +1,199 @@
+#include "gi/indirect.h"
+
+#include "gi/near_light.h"
+#include "gi/surface.h"
+#include "gi/vpl_visibility.h"
+
+/* 1/m², in place of the bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
+#define UNBOUNDED 1e18f
+
+void es_indirect_planes_free(es_context* context, es_indirect_planes* planes)
+{
+    es_planes_free(context, &planes->irradiance);
+    es_planes_free(context, &planes->specular);
+}
+
+/* Textures may make any roughness of it. */
+static bool material_has_lobe(const es_material_desc* m)
+{
+    es_surface surface = es_surface_of(m->model, es_v3(1, 1, 1), m->metallic, m->model == ES_SURFACE_PHONG ? m->exponent : m->roughness, m->specular);
+    return es_surface_has_lobe(&surface) || (m->model == ES_SURFACE_METALLIC_ROUGHNESS && m->metallic_roughness_texture.image);
+}
+
+static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
+{
+    for (uint32_t i = 0; i < renderer->vpl_count; i++)
+        if (renderer->vpls[i].glossy) return true;
+    for (uint32_t i = 0; i < list->instance_count; i++)
+        if (material_has_lobe(&list->materials[list->instances[i].material])) return true;
+    return false;
+}
+
+/* What the indirect light is shaded and filtered on. */
+static const es_gbuffer* shaded_gbuffer(const es_renderer* r) { return r->frame.settings.half_resolution ? &r->half : &r->gbuffer; }
+
+/* At every pixel, whatever the setting of the pattern. */
+static bool every_light(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED && !s->traced_interleave; }
+static uint32_t interleave_of(const es_renderer_settings* s) { return every_light(s) ? 1 : s->interleave; }
+static float near_distance_of(const es_renderer* r) { return r->frame.settings.traced_bias == ES_TRACED_BOUNDED ? r->frame.settings.near_distance * r->frame.extent : 0.0f; }
+
+/* ---- shading ---------------------------------------------------------------------------------------------------------------- */
+
+es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradiance, es_planes* specular)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    const float extent = r->frame.extent, near = near_distance_of(r);
+    const bool sampled = s->method == ES_GI_VPL_SAMPLED, traced = sampled || s->method == ES_GI_VPL_TRACED;
+    const es_gbuffer* shaded = shaded_gbuffer(r);
+    es_result result = es_planes_resize(r->context, irradiance, shaded);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, specular, shaded);
+    if (result) return result;
+    es_shade_job job = {.gbuffer = shaded, .rays = s->half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - lights,
+        .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness,
+        .geometry_bound = s->geometry_bound / (extent * extent), .interleave = interleave_of(s)};
+    for (int k = 0; k < 3; k++) {
+        job.irradiance[k] = irradiance->at[k];
+        job.specular[k] = r->has_specular ? specular->at[k] : NULL;
+    }
+    es_arena_reset(&r->arena);
+    es_vpl_visibility visibility;
+    if (traced) {
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, r->vpls, r->vpl_count, extent, &visibility);
+        job.visibility = &visibility.shade;
+        job.maps = NULL;
+    }
+    es_near_light near_light;
+    if (near > 0.0f) {
+        near_light = es_near_light_of(&r->trace_scene, near, extent * ES_RAY_OFFSET_SHARE);
+        job.near = &near_light.shade;
+        job.geometry_bound = 1.0f / (near * near);
+        job.spread = 0.0f;
+    }
+    if (s->traced_bias == ES_TRACED_UNBOUNDED) {
+        job.geometry_bound = UNBOUNDED;
+        job.spread = job.lobe_roughness = 0.0f;
+    }
+    return result ? result : es_shade(r->context, &r->arena, &job);
+}
+
+es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    if (in->no_indirect || !r->vpl_count) {
+        es_plan_not_needed(plan, ES_PASS_SHADING, in->no_indirect ? in->no_indirect : "the lights reach nothing");
+        return ES_OK;
+    }
+    r->has_specular = frame_has_lobes(r, in->list);
+    es_plan_begin(plan, ES_PASS_SHADING);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_ISM);
+    es_plan_reads_pass(plan, ES_PASS_CLASSIC);
+    es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
+    const bool sampled = s->method == ES_GI_VPL_SAMPLED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
+    const uint32_t interleave = interleave_of(s);
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
+    es_result result = s->half_resolution ? es_gbuffer_halve(r->context, &r->gbuffer, &r->half) : ES_OK;
+    if (!result) result = es_indirect_shade(r, r->vpl_count, &r->irradiance, &r->specular);
+    const es_gbuffer* shaded = shaded_gbuffer(r);
+    if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)shaded->width * shaded->height * r->vpl_count / (interleave * interleave));
+    return result;
+}
+
+/* ---- filter ------------------------------------------------------------------------------------------------------------------ */
+
+es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes stages_irradiance[2], es_planes stages_specular[2])
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    const es_gbuffer* shaded = shaded_gbuffer(r);
+    es_result result = ES_OK;
+    for (uint32_t i = 0; i < 2 && i < r->filter_passes && !result; i++) {
+        result = es_planes_resize(r->context, &stages_irradiance[i], shaded);
+        if (!result && r->has_specular) result = es_planes_resize(r->context, &stages_specular[i], shaded);
+    }
+    for (uint32_t pass = 0; pass < r->filter_passes && !result; pass++) {
+        es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+        for (int k = 0; k < 3; k++) {
+            job.source[k] = irradiance->at[k];
+            job.result[k] = stages_irradiance[pass % 2].at[k];
+            job.source[k + 3] = specular->at[k];
+            job.result[k + 3] = stages_specular[pass % 2].at[k];
+        }
+        irradiance = &stages_irradiance[pass % 2];
+        specular = &stages_specular[pass % 2];
+        es_arena_reset(&r->arena);
+        result = es_filter_geometry_aware(r->context, &r->arena, &job);
+    }
+    return result;
+}
+
+es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    r->filter_passes = why ? 0 : s->filter_passes;
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_FILTER, why);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
+    es_result result = es_indirect_filter(r, &r->irradiance, &r->specular, r->filtered_irradiance, r->filtered_specular);
+    const es_gbuffer* shaded = shaded_gbuffer(r);
+    if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)shaded->width * shaded->height * s->filter_passes);
+    return result;
+}
+
+static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : &r->irradiance; }
+static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : &r->specular; }
+
+/* ---- interpolation ------------------------------------------------------------------------------------------------------------ */
+
+es_result es_indirect_upsample(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes* whole_irradiance, es_planes* whole_specular)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    es_result result = es_planes_resize(r->context, whole_irradiance, &r->gbuffer);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, whole_specular, &r->gbuffer);
+    if (result) return result;
+    es_upsample_job job = {.gbuffer = &r->gbuffer, .half = &r->half, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = irradiance->at[k];
+        job.result[k] = whole_irradiance->at[k];
+        job.source[k + 3] = specular->at[k];
+        job.result[k + 3] = whole_specular->at[k];
+    }
+    es_upsample(r->context, &job);
+    return ES_OK;
+}
+
+es_result es_pass_upsample(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->half_resolution ? "half-resolution is off" : NULL;
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_UPSAMPLE, why);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_UPSAMPLE);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_plan_reads_pass(plan, ES_PASS_FILTER);
+    float numbers[] = {s->filter_depth, s->filter_normal, r->has_specular};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_UPSAMPLE)) return ES_OK;
+    es_result result = es_indirect_upsample(r, filtered_irradiance(r), filtered_specular(r), &r->upsampled_irradiance, &r->upsampled_specular);
+    if (!result) es_plan_done(plan, ES_PASS_UPSAMPLE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+    return result;
+}
+
+const es_planes* es_indirect_irradiance(const es_renderer* r) { return r->plan.valid[ES_PASS_UPSAMPLE] ? &r->upsampled_irradiance : filtered_irradiance(r); }
+const es_planes* es_indirect_specular(const es_renderer* r) { return r->plan.valid[ES_PASS_UPSAMPLE] ? &r->upsampled_specular : filtered_specular(r); }

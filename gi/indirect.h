@@ -1,0 +1,27 @@
+/* From virtual point lights to the picture's indirect light: shading, filter, and interpolation where only one pixel of four was shaded. Each
+ * is a pass of the frame, and a function that can be had again for some of the lights (the images of single bounces). */
+#ifndef EARTHSHINE_GI_INDIRECT_H
+#define EARTHSHINE_GI_INDIRECT_H
+
+#include "gi/renderer.h"
+
+/* Irradiance of the diffuse part and radiance of the lobe; the latter is used when the frame has lobes. */
+typedef struct es_indirect_planes { es_planes irradiance, specular; } es_indirect_planes;
+void es_indirect_planes_free(es_context* context, es_indirect_planes* planes);
+
+/* All with the settings of the frame that is being, or was last, rendered. Lights from `lights` on send nothing; the others are shaded as if
+ * they did, so that the light of the first n is what any frame adds up before it comes to the rest. */
+es_result es_indirect_shade(es_renderer* renderer, uint32_t lights, es_planes* irradiance, es_planes* specular);
+/* Back and forth between two sets of planes, es_renderer.filter_passes times; the last result is in stages[(filter_passes - 1) % 2]. */
+es_result es_indirect_filter(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes stages_irradiance[2], es_planes stages_specular[2]);
+es_result es_indirect_upsample(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes* whole_irradiance, es_planes* whole_specular);
+
+/* What the frame shows, after filter and interpolation. */
+const es_planes* es_indirect_irradiance(const es_renderer* renderer);
+const es_planes* es_indirect_specular(const es_renderer* renderer);
+
+es_result es_pass_shading(es_renderer* renderer, const es_frame_inputs* in);
+es_result es_pass_filter(es_renderer* renderer, const es_frame_inputs* in);
+es_result es_pass_upsample(es_renderer* renderer, const es_frame_inputs* in);
+
+#endif
