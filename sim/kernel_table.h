@@ -1,0 +1,25 @@
+/* The world floor's kernels, one table per instruction set. */
+#ifndef EARTHSHINE_SIM_KERNEL_TABLE_H
+#define EARTHSHINE_SIM_KERNEL_TABLE_H
+
+#include "platform/platform.h"
+
+/* X(name, arguments) */
+#define ES_SIM_KERNELS(X)                                                                                        \
+    /* Cross products of triangles [begin, end) from vertices times `scale`, 4 floats each; begin a multiple of 8, and zeros are   \
+     * written up to the next one after end. indices: 3 per triangle */                                          \
+    X(face_normals, (const float* positions, const uint32_t* indices, uint32_t begin, uint32_t end, float scale, float* faces)) \
+    /* normals of vertex blocks [begin, end) as sim/normals.h has them */                                        \
+    X(vertex_normals, (const uint32_t* first_row, const uint32_t* rows, const float* faces, uint32_t begin, uint32_t end, float* normals))
+
+struct es_sim_kernels {
+#define ES_SIM_KERNEL_FIELD(name, arguments) void (*name) arguments;
+    ES_SIM_KERNELS(ES_SIM_KERNEL_FIELD)
+#undef ES_SIM_KERNEL_FIELD
+};
+typedef struct es_sim_kernels es_sim_kernels;
+
+/* NULL when the ISA was not built; whether it runs here is es_isa_available_mask()'s to say */
+const struct es_sim_kernels* es_sim_kernel_table(es_isa isa);
+
+#endif
