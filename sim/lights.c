@@ -109,7 +109,7 @@ static bool state_of(const es_world* world, const es_light_object* object, es_li
     state->direction = es_v3_normalize(es_v3(-m[8], -m[9], -m[10]), es_v3(0, 0, -1));
     float strongest = 0;
     for (int c = 0; c < 3; c++) {
-        state->radiant[c] = desc->color[c] * desc->intensity;
+        state->radiant[c] = desc->color[c] * desc->intensity * (1.0f - object->dimmed);
         strongest = es_maxf(strongest, state->radiant[c]);
     }
     if (desc->type == ES_LIGHT_SPOT) {

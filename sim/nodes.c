@@ -66,7 +66,7 @@ es_result es_world_destroy_node(es_world* world, es_node node)
     es_node_object* object = node_object(world, node);
     if (!object) return ES_STALE_HANDLE;
     if (object->object.references)
-        return es_misuse(world->context, ES_WRONG_STATE, "node '%.64s' cannot be destroyed: %u children, instances, cameras, lights or clip channels use it",
+        return es_misuse(world->context, ES_WRONG_STATE, "node '%.64s' cannot be destroyed: %u children, instances, cameras, lights, clip channels or movers use it",
             object->object.name ? object->object.name : "", object->object.references);
     es_world_rereference(world, ES_OBJECT_NODE, object->parent.id, 0);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_NODE], &object->object);

@@ -27,6 +27,7 @@ typedef struct es_instance { uint32_t id; } es_instance;
 typedef struct es_camera { uint32_t id; } es_camera;
 typedef struct es_light { uint32_t id; } es_light;
 typedef struct es_clip { uint32_t id; } es_clip;
+typedef struct es_mover { uint32_t id; } es_mover;
 
 /* ---- the world itself ------------------------------------------------------------------------------------------------------------ */
 
@@ -237,6 +238,38 @@ typedef struct es_shape_desc {
 /* A box of 1 m with every default written out. */
 ES_API es_shape_desc es_default_shape_desc(void);
 
+/* ---- movers: motion by a formula ----------------------------------------------------------------------------------------------------------------- */
+
+typedef enum es_mover_type {
+    ES_MOVER_ORBIT,     /* the node circles about `axis` through `centre`, once per period, and turns with it */
+    ES_MOVER_SWING,     /* it swings about the same axis, amplitude × sin of the turn: a pendulum, a swaying lamp */
+    ES_MOVER_AIM,       /* its -z looks at `target`, or at the place `centre` when that is null; its x stays level */
+    ES_MOVER_FLICKER    /* the light gives 1 - amplitude × noise of its intensity: a flame; three octaves, from `seed` */
+} es_mover_type;
+typedef struct es_mover_desc {
+    const char* name;
+    es_mover_type type;
+    es_node node;             /* ORBIT, SWING, AIM; what is attached to it goes along */
+    es_node target;           /* AIM */
+    es_light light;           /* FLICKER */
+    es_vec3 centre;           /* ORBIT, SWING: in the axes of the node's parent, metres; AIM: in the world's */
+    es_vec3 arm;              /* ORBIT, SWING: from the centre to the node where the angle is zero */
+    es_vec3 axis;             /* made unit; the zero vector counts as +y */
+    es_quat rotation;         /* ORBIT, SWING: of the node where the angle is zero; all zero: identity */
+    bool keep_rotation;       /* ORBIT, SWING: leave the node's rotation to others */
+    float period;             /* seconds, 1e-3 … 1e6; 0: 1. FLICKER: between two values of the slowest octave */
+    float phase;              /* periods passed at time 0 */
+    float amplitude;          /* SWING: radians; FLICKER: 0 … 1 */
+    uint32_t seed;            /* FLICKER */
+    bool off;                 /* the node stays where it is, the light at full intensity */
+} es_mover_desc;
+ES_API es_mover_desc es_default_mover_desc(void);
+/* Movers play after the clips, from the next step on; several on one node or light: the last one added wins. */
+ES_API es_result es_world_add_mover(es_world* world, const es_mover_desc* desc, es_mover* mover);
+ES_API es_result es_world_set_mover(es_world* world, es_mover mover, const es_mover_desc* desc);
+ES_API es_result es_world_get_mover(const es_world* world, es_mover mover, es_mover_desc* desc);
+ES_API es_result es_world_destroy_mover(es_world* world, es_mover mover);
+
 /* ---- destroying and enumerating ----------------------------------------------------------------------------------------------------------------- */
 
 /* Refused (WRONG_STATE) while something that exists refers to the object. */
@@ -249,7 +282,7 @@ ES_API es_result es_world_destroy_camera(es_world* world, es_camera camera);
 ES_API es_result es_world_destroy_light(es_world* world, es_light light);
 ES_API es_result es_world_destroy_clip(es_world* world, es_clip clip);
 
-typedef enum es_object_kind { ES_OBJECT_TEXTURE, ES_OBJECT_MATERIAL, ES_OBJECT_MESH, ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_KINDS } es_object_kind;
+typedef enum es_object_kind { ES_OBJECT_TEXTURE, ES_OBJECT_MATERIAL, ES_OBJECT_MESH, ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_MOVER, ES_OBJECT_KINDS } es_object_kind;
 /* Handles of all objects of a kind in creation-slot order; *count is the capacity in, the number of objects out; ids NULL asks for it. */
 ES_API es_result es_world_enumerate(const es_world* world, es_object_kind kind, uint32_t* ids, size_t* count);
 /* "" when unnamed; NULL for a stale handle. */

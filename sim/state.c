@@ -129,11 +129,16 @@ static void visit_light(es_world* world, state_io* io, es_light_object* light)
     visit_floats(io, &desc.outer_cone, 1);
     visit_floats(io, &desc.range, 1);
     visit_flag(io, &desc.off);
+    float dimmed = light->dimmed;
+    visit_floats(io, &dimmed, 1);
     if (!reading(io) || !io->good) return;
-    io->good = type <= ES_LIGHT_DIRECTIONAL;
+    io->good = type <= ES_LIGHT_DIRECTIONAL && es_within(dimmed, 0, 1);
     desc.type = (es_light_type)type;
     io->good = io->good && es_light_desc_resolve(world, &desc, &resolved);
-    if (io->good && io->mode == APPLY) es_world_set_light(world, (es_light){light->object.id}, &desc);
+    if (io->good && io->mode == APPLY) {
+        light->dimmed = dimmed;
+        es_world_set_light(world, (es_light){light->object.id}, &desc);
+    }
 }
 
 static void visit_stream(state_io* io, float* stream, size_t floats)
@@ -194,6 +199,33 @@ static void visit_clip(state_io* io, es_clip_object* clip)
     clip->start = start;
 }
 
+static void visit_mover(es_world* world, state_io* io, es_mover_object* mover)
+{
+    es_mover_desc desc = mover->desc;
+    uint32_t type = desc.type;
+    visit_u32(io, &type);
+    visit_u32(io, &desc.node.id);
+    visit_u32(io, &desc.target.id);
+    visit_u32(io, &desc.light.id);
+    visit_floats(io, &desc.centre.x, 3);
+    visit_floats(io, &desc.arm.x, 3);
+    visit_floats(io, &desc.axis.x, 3);
+    visit_floats(io, &desc.rotation.x, 4);
+    visit_flag(io, &desc.keep_rotation);
+    visit_floats(io, &desc.period, 1);
+    visit_floats(io, &desc.phase, 1);
+    visit_floats(io, &desc.amplitude, 1);
+    visit_u32(io, &desc.seed);
+    visit_flag(io, &desc.off);
+    if (!reading(io) || !io->good) return;
+    io->good = type <= ES_MOVER_FLICKER;
+    desc.type = (es_mover_type)type;
+    bool light = desc.type == ES_MOVER_FLICKER;
+    io->good = io->good && es_mover_numbers_valid(&desc) && (es_slots_get(&world->slots[ES_OBJECT_LIGHT], desc.light.id) != NULL) == light &&
+               (es_slots_get(&world->slots[ES_OBJECT_NODE], desc.node.id) != NULL) == !light && (!desc.target.id || es_slots_get(&world->slots[ES_OBJECT_NODE], desc.target.id));
+    if (io->good && io->mode == APPLY) es_world_set_mover(world, (es_mover){mover->object.id}, &desc);
+}
+
 /* The image is an asset; its size is in the signature of the content. */
 static void visit_environment(es_world* world, state_io* io)
 {
@@ -237,7 +269,7 @@ static void visit_world(es_world* world, state_io* io)
         world->camera_dirty = world->nodes_moving = world->list_dirty = true;
     }
     visit_environment(world, io);
-    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_MESH};
+    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_MOVER, ES_OBJECT_CLIP, ES_OBJECT_MESH};
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++)
         for (uint32_t slot = 0; slot < world->slots[kinds[k]].slot_count && (io->good || !reading(io)); slot++) {
             void* object = es_slots_at(&world->slots[kinds[k]], slot);
@@ -247,6 +279,7 @@ static void visit_world(es_world* world, state_io* io)
             case ES_OBJECT_INSTANCE: visit_instance(world, io, object); break;
             case ES_OBJECT_CAMERA: visit_camera(world, io, object); break;
             case ES_OBJECT_LIGHT: visit_light(world, io, object); break;
+            case ES_OBJECT_MOVER: visit_mover(world, io, object); break;
             case ES_OBJECT_CLIP: visit_clip(io, object); break;
             default: visit_mesh(world, io, object); break;
             }

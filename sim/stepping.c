@@ -18,7 +18,11 @@ bool es_dynamics_present(const es_world* world)
 }
 
 /* What bodies stand on and cloth hangs from is taken to where it is at the step's end. */
-static void pose_at(es_world* world, double time) { es_clips_play(world, time); }
+static void pose_at(es_world* world, double time)
+{
+    es_clips_play(world, time);
+    es_movers_play(world, time);
+}
 
 static es_result fixed_step(es_world* world)
 {

@@ -17,6 +17,7 @@ static const struct { const char* name; size_t size; uint32_t limit; } kinds[ES_
     [ES_OBJECT_CAMERA] = {"camera", sizeof(es_camera_object), ES_SLOT_LIMIT},
     [ES_OBJECT_LIGHT] = {"light", sizeof(es_light_object), ES_SLOT_LIMIT},
     [ES_OBJECT_CLIP] = {"clip", sizeof(es_clip_object), ES_SLOT_LIMIT},
+    [ES_OBJECT_MOVER] = {"mover", sizeof(es_mover_object), ES_SLOT_LIMIT},
 };
 
 void* es_world_object(const es_world* world, es_object_kind kind, uint32_t id)
@@ -210,6 +211,7 @@ es_result es_world_finish_opening(es_world* world)
     choose_clips(world);
     es_fp_environment environment = es_fp_enter();
     es_clips_play(world, world->time);
+    es_movers_play(world, world->time);
     es_fp_leave(environment);
     es_world_settle(world);
     es_world_refresh(world);

@@ -54,7 +54,13 @@ typedef struct es_camera_object {
     bool fresh;
 } es_camera_object;
 
-typedef struct es_light_object { es_object object; es_light_desc desc; } es_light_object;
+typedef struct es_light_object {
+    es_object object;
+    es_light_desc desc;
+    float dimmed;            /* share of the intensity that a flicker takes away now */
+} es_light_object;
+
+typedef struct es_mover_object { es_object object; es_mover_desc desc; } es_mover_object; /* name NULL */
 
 typedef struct es_clip_object {
     es_object object;
@@ -150,6 +156,9 @@ bool es_transform_resolve(const es_transform* transform, es_transform* resolved)
 
 /* Poses what playing clips move as it is at `time`. */
 void es_clips_play(es_world* world, double time);
+/* The same for movers; refreshes the nodes when one aims. */
+void es_movers_play(es_world* world, double time);
+bool es_mover_numbers_valid(const es_mover_desc* desc);
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
 void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
