@@ -49,13 +49,17 @@ typedef struct es_renderer_settings {
     float near_distance;             /* share of the scene's extent: what lights nearer than this would send too much of is found by a ray per pixel, in
                                       * place of geometry_bound and spread, which then do not apply; 0: by the lights alone, as far as those let it; with traced_bias BOUNDED */
     float spread;                    /* how far a light's own area softens it close by: 0 a point, 1 a disc of that area */
-    bool view_importance;            /* more lights where they matter for what the camera sees */
+    bool view_importance;            /* more lights where they matter for what the camera sees; without effect on stable ones, which no camera moves */
+    bool stable_vpls;                /* lights keep their places between frames and follow the surface they sit on (Laine et al. 2007, for anything that moves) */
+    float renew;                     /* stable: share of the lights that may be moved elsewhere in one frame */
     float lobe_roughness;            /* lobes sharper than this GGX roughness are widened to it under virtual point lights */
     bool glossy_vpls;                /* VPLs emit their surface's glossy lobe too (Knecht §3.4.3) */
     /* imperfect shadow maps */
     uint32_t ism_size;               /* texels of a side: 32, 64, 128, 256 */
     uint32_t ism_points;             /* per map */
     uint32_t ism_pool;               /* points that represent the scene */
+    float ism_detail;                /* 0: points per area are the same everywhere; 1: every object has as many points; es_instance_desc.point_weight comes on top */
+    uint32_t ism_kept;               /* MiB for what is kept of the maps of lights that stay where they are, besides the maps; 0: nothing is */
     bool pull_push;
     float pull_threshold;            /* share of the scene's extent (thesis: 0.05) */
     float push_threshold;

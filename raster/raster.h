@@ -87,6 +87,7 @@ ES_API es_material_desc es_default_material_desc(void);
 typedef struct es_raster_mesh {
     const float* positions;           /* x y z 1 */
     const float* previous_positions;  /* last frame's, NULL: the same as positions */
+    const float* rest_positions;      /* as the mesh was made, before anything deformed it; NULL: the same as positions. Not drawn */
     const float* normals;             /* x y z 0, need not be unit; NULL: geometric normals */
     const float* tangents;            /* x y z, w = ±1 handedness; NULL: derived from uv derivatives where a normal map needs them */
     const float* uvs;                 /* u0 v0 u1 v1; NULL: zero */
@@ -102,6 +103,7 @@ typedef struct es_raster_instance {
     uint32_t material;                /* index into es_draw_list.materials, < 65536 */
     uint32_t id;                      /* written to the G-buffer; below 2^32 - 1 */
     es_mat4 transform, previous_transform; /* object to world, affine */
+    float point_weight;               /* how densely points stand for it where a scene becomes points, against others; 0: 1, negative: not at all. Not drawn */
 } es_raster_instance;
 
 typedef struct es_draw_list {

@@ -11,6 +11,7 @@
 
 static es_result check_desc(es_world* world, const es_instance_desc* desc)
 {
+    if (!(desc->point_weight <= 1e6f && desc->point_weight >= -1e30f)) return es_fail(world->context, ES_INVALID_ARGUMENT, "an instance's point weight must be a number up to 1e6");
     if (!es_world_object(world, ES_OBJECT_MESH, desc->mesh.id)) return ES_STALE_HANDLE;
     if (desc->node.id && !es_world_object(world, ES_OBJECT_NODE, desc->node.id)) return ES_STALE_HANDLE;
     if (desc->material.id && !es_world_object(world, ES_OBJECT_MATERIAL, desc->material.id)) return ES_STALE_HANDLE;
@@ -53,7 +54,8 @@ es_result es_world_set_instance(es_world* world, es_instance instance, const es_
     es_result result = check_desc(world, desc);
     if (result != ES_OK) return result;
     es_instance_desc* now = &object->desc;
-    if (now->node.id == desc->node.id && now->mesh.id == desc->mesh.id && now->material.id == desc->material.id && now->hidden == desc->hidden)
+    if (now->node.id == desc->node.id && now->mesh.id == desc->mesh.id && now->material.id == desc->material.id && now->hidden == desc->hidden &&
+        now->point_weight == desc->point_weight)
         return ES_OK;
     exchange_references(world, now, desc);
     *now = *desc;
@@ -213,9 +215,9 @@ void es_draw_list_refresh(es_world* world)
         if (!es_all_within(last.m, 16, ES_WORLD_EXTENT)) last = now;
         uint32_t material = object->desc.material.id ? es_slot_of(object->desc.material.id) + 1 : 0;
         es_raster_instance* entry = &world->drawn[count];
-        differs |= count >= world->list.instance_count || entry->id != slot || entry->mesh != &mesh->raster || entry->material != material ||
+        differs |= count >= world->list.instance_count || entry->id != slot || entry->mesh != &mesh->raster || entry->material != material || entry->point_weight != object->desc.point_weight ||
                    memcmp(&entry->transform, &now, sizeof now) != 0;
-        *entry = (es_raster_instance){&mesh->raster, material, slot, now, last};
+        *entry = (es_raster_instance){&mesh->raster, material, slot, now, last, object->desc.point_weight};
         world->instances_moving |= mesh->moving || memcmp(&now, &last, sizeof now) != 0;
         if (count++ == 0) {
             world->bounds_min = low;

@@ -214,6 +214,7 @@ bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh)
         mesh->rest = es_allocate(world->context, bytes);
         if (!mesh->rest) return false;
         memcpy(mesh->rest, mesh->positions, bytes);
+        mesh->raster.rest_positions = mesh->rest;
     }
     if (mesh->normals && !mesh->rest_normals) {
         mesh->rest_normals = es_allocate(world->context, bytes);

@@ -136,7 +136,13 @@ ES_API es_result es_world_get_node_matrix(const es_world* world, es_node node, e
 ES_API es_node es_world_find_node(const es_world* world, const char* name);
 
 /* A null node stands for the world's own axes (here, for cameras and for lights), a null material for the default one. */
-typedef struct es_instance_desc { es_node node; es_mesh mesh; es_material material; bool hidden; } es_instance_desc;
+typedef struct es_instance_desc {
+    es_node node;
+    es_mesh mesh;
+    es_material material;
+    bool hidden;
+    float point_weight;       /* points per area in imperfect shadow maps, against other instances, up to 1e6 (Knecht §5.1, §6.1); 0: 1, negative: none */
+} es_instance_desc;
 ES_API es_result es_world_add_instance(es_world* world, const es_instance_desc* desc, es_instance* instance);
 ES_API es_result es_world_set_instance(es_world* world, es_instance instance, const es_instance_desc* desc);
 ES_API es_result es_world_get_instance(const es_world* world, es_instance instance, es_instance_desc* desc);

@@ -148,7 +148,7 @@ static void references(void** state)
     es_mesh mesh = add_triangle(w);
     es_node node = add_node(w, "n", (es_node){0}, es_v3(0, 0, 0));
     es_instance instance;
-    assert_int_equal(es_world_add_instance(w, &(es_instance_desc){node, mesh, material, false}, &instance), ES_OK);
+    assert_int_equal(es_world_add_instance(w, &(es_instance_desc){.node = node, .mesh = mesh, .material = material}, &instance), ES_OK);
     assert_int_equal(es_world_destroy_texture(w, texture), ES_WRONG_STATE);
     assert_int_equal(es_world_destroy_material(w, material), ES_WRONG_STATE);
     assert_int_equal(es_world_destroy_mesh(w, mesh), ES_WRONG_STATE);
