@@ -16,7 +16,6 @@ typedef struct ism_loop {
     uint16_t* scratch;
     size_t scratch_texels;     /* a worker's */
     es_pull_push_parameters fill;
-    float splat_width;
     uint32_t subsets;
 } ism_loop;
 
@@ -42,23 +41,35 @@ void es_ism_maps_free(es_context* context, es_ism_maps* maps)
     *maps = (es_ism_maps){0};
 }
 
+/* The points of each density with squares of their own width. */
+static void splat(const ism_loop* loop, uint32_t subset, es_parabolic_map* map, uint16_t* work)
+{
+    const es_scene_points* points = loop->job->points;
+    uint32_t begin = 0;
+    for (uint32_t rank = 0; rank < points->rank_count; rank++) {
+        const uint32_t end = es_scene_points_border(points, subset, points->rank_end[rank]);
+        const size_t first = (size_t)subset * points->subset_size + begin;
+        const es_point_set set = {points->x + first, points->y + first, points->z + first, end - begin};
+        map->splat_width = points->rank_width[rank];
+        if (end > begin) loop->kernels->splat_parabolic_map(map, &set, work);
+        begin = end;
+    }
+}
+
 static void draw_map(const ism_loop* loop, uint32_t v, uint16_t* work)
 {
     const es_ism_job* job = loop->job;
-    const es_scene_points* points = job->points;
     const size_t texels = (size_t)job->size * job->size;
     uint16_t* map = loop->maps + v * texels;
     memset(work, 0xff, texels * sizeof *work);
     if (loop->subsets) {
         const es_vpl_record* vpl = &job->vpls[v];
-        size_t first = (size_t)(v % loop->subsets) * points->subset_size;
-        es_point_set subset = {points->x + first, points->y + first, points->z + first, points->subset_size};
-        es_parabolic_map parabolic = {.far_distance = job->far_distance, .near_distance = job->near_distance, .splat_width = loop->splat_width, .size = job->size};
+        es_parabolic_map parabolic = {.far_distance = job->far_distance, .near_distance = job->near_distance, .size = job->size};
         memcpy(parabolic.position, vpl->position, sizeof parabolic.position);
         memcpy(parabolic.normal, vpl->normal, sizeof parabolic.normal);
         memcpy(parabolic.tangent, vpl->tangent, sizeof parabolic.tangent);
         memcpy(parabolic.bitangent, vpl->bitangent, sizeof parabolic.bitangent);
-        loop->kernels->splat_parabolic_map(&parabolic, &subset, work);
+        splat(loop, v % loop->subsets, &parabolic, work);
         if (job->pull_push) {
             loop->kernels->pull_push(&loop->fill, work, work + (es_splat_texels(job->size) + 31) / 32 * 32, map);
             return;
@@ -97,7 +108,6 @@ es_result es_ism_maps_build(es_context* context, es_ism_maps* maps, const es_ism
     loop.scratch_texels = (es_splat_texels(job->size) + 31) / 32 * 32 + (es_pull_push_texels(job->size) + 31) / 32 * 32;
     loop.scratch = es_allocate_array(context, workers, loop.scratch_texels * sizeof *loop.scratch);
     if (!loop.scratch) return es_context_last_result(context);
-    if (loop.subsets) loop.splat_width = es_sqrt(job->points->area / (float)job->points->subset_size);
     loop.fill = (es_pull_push_parameters){.size = job->size, .levels = job->pull_push_levels,
         .pull = (uint32_t)(es_clampf(job->pull_threshold, 0.0f, 1.0f) * (float)ES_PARABOLIC_DEPTH_MAX),
         .push = (uint32_t)(es_clampf(job->push_threshold, 0.0f, 1.0f) * (float)ES_PARABOLIC_DEPTH_MAX)};

@@ -329,11 +329,11 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
     uint32_t subsets = subset_count(s);
     es_plan_begin(plan, ES_PASS_POINTS);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
-    uint32_t words[] = {s->ism_points, subsets};
-    es_plan_reads(plan, words, sizeof words);
+    es_point_request request = {s->ism_points, subsets, s->ism_detail};
+    es_plan_reads(plan, &request, sizeof request);
     if (es_plan_run(plan, ES_PASS_POINTS)) {
         uint64_t moved;
-        es_result result = es_scene_points_update(r->context, &r->points, in->list, s->ism_points, subsets, &moved);
+        es_result result = es_scene_points_update(r->context, &r->points, in->list, &request, &moved);
         if (result) return result;
         es_plan_done(plan, ES_PASS_POINTS, moved);
     }

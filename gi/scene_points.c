@@ -7,97 +7,221 @@
 #include "platform/maths.h"
 #include "platform/random.h"
 
-static es_vec3 vertex(const es_raster_mesh* mesh, const es_mat4* transform, uint32_t index)
+/* ---- areas ------------------------------------------------------------------------------------------------------------------ */
+
+/* 7 bits of mantissa, to nearest: rotating a thing leaves the rounded numbers as they are */
+static double rounded(float x)
 {
-    const float* p = mesh->positions + 4 * (size_t)index;
-    return es_mat4_point(transform, es_v3(p[0], p[1], p[2]));
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = (bits + 0x8000u) & 0xffff0000u;
+    memcpy(&x, &bits, sizeof x);
+    return (double)x;
 }
 
-/* ---- distribution: done when the set of triangles changes ------------------------------------------------------------------- */
-
-typedef struct distribution {
-    es_scene_points* points;
-    const es_draw_list* list;
-    const uint64_t* first_triangle;  /* of each instance in the sequence of all triangles; one more entry: the end */
-    const double* area_before;       /* summed area before triangle i; one more entry: the total */
-    uint32_t* instance_of_point;
-} distribution;
-
-static void areas_of_instance(const es_raster_instance* instance, double* area_before, double* sum)
+/* Lengths and angles that the transform makes of its axes, which is all that areas depend on. The sum of squares keeps 7 bits, the parts
+ * are multiples of 1/3072 of it: the third that each has where nothing is stretched is one. */
+static void gram_of(const es_mat4* transform, double gram[6])
 {
-    const es_raster_mesh* mesh = instance->mesh;
-    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-        const uint32_t* i = mesh->indices + 3 * (size_t)t;
-        es_vec3 a = vertex(mesh, &instance->transform, i[0]), b = vertex(mesh, &instance->transform, i[1]), c = vertex(mesh, &instance->transform, i[2]);
-        float area = 0.5f * es_v3_length(es_v3_cross(es_v3_sub(b, a), es_v3_sub(c, a)));
-        area_before[t] = *sum;
-        if (area > 0.0f && area < 1e30f) *sum += area;
+    const float* m = transform->m;
+    const es_vec3 x = es_v3(m[0], m[1], m[2]), y = es_v3(m[4], m[5], m[6]), z = es_v3(m[8], m[9], m[10]);
+    const float parts[6] = {es_v3_dot(x, x), es_v3_dot(y, y), es_v3_dot(z, z), es_v3_dot(x, y), es_v3_dot(x, z), es_v3_dot(y, z)};
+    const float sum = parts[0] + parts[1] + parts[2];
+    memset(gram, 0, 6 * sizeof *gram);
+    if (!(sum > 1e-30f && sum < 1e30f)) return;
+    for (int k = 0; k < 6; k++) gram[k] = (double)(int32_t)(parts[k] / sum * 3072.0f + (parts[k] < 0.0f ? -0.5f : 0.5f)) * (rounded(sum) / 3072.0);
+}
+
+static double dot(const double gram[6], const double a[3], const double b[3])
+{
+    return gram[0] * a[0] * b[0] + gram[1] * a[1] * b[1] + gram[2] * a[2] * b[2] + gram[3] * (a[0] * b[1] + a[1] * b[0]) + gram[4] * (a[0] * b[2] + a[2] * b[0]) +
+        gram[5] * (a[1] * b[2] + a[2] * b[1]);
+}
+
+static double root(double x) { return x > 0.0 ? __builtin_sqrt(x) : 0.0; }
+
+static double triangle_area(const float* positions, const uint32_t* index, const double gram[6])
+{
+    const float *a = positions + 4 * (size_t)index[0], *b = positions + 4 * (size_t)index[1], *c = positions + 4 * (size_t)index[2];
+    double u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = (double)b[k] - (double)a[k];
+        v[k] = (double)c[k] - (double)a[k];
+    }
+    const double uv = dot(gram, u, v), area = 0.5 * root(dot(gram, u, u) * dot(gram, v, v) - uv * uv);
+    return area < 1e30 ? area : 0.0;
+}
+
+typedef struct measuring { const es_raster_mesh* mesh; const double* gram; double *rest, *now; } measuring;
+
+static void measure(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const measuring* job = user;
+    const es_raster_mesh* mesh = job->mesh;
+    for (uint32_t t = begin; t < end; t++) {
+        job->rest[t] = triangle_area(mesh->rest_positions ? mesh->rest_positions : mesh->positions, mesh->indices + 3 * (size_t)t, job->gram);
+        if (mesh->rest_positions) job->now[t] = triangle_area(mesh->positions, mesh->indices + 3 * (size_t)t, job->gram);
     }
 }
 
-static void distribute_subsets(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+/* What each triangle weighs: its area at rest, and of what it has changed beyond ES_POINTS_STRETCH the excess. `shares` has room for twice
+ * as many numbers as there are triangles. */
+static void weigh_triangles(es_context* context, const es_raster_mesh* mesh, es_point_source* source, double* shares)
 {
-    distribution* d = user;
-    es_scene_points* points = d->points;
-    uint64_t triangle_total = d->first_triangle[d->list->instance_count];
-    double total = d->area_before[triangle_total], step = total / points->subset_size;
+    double rest_area = 0.0, area = 0.0, *areas = shares + mesh->triangle_count;
+    measuring job = {mesh, source->gram, shares, areas};
+    es_parallel_for(context, mesh->triangle_count, 2048, measure, &job);
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) rest_area += shares[t];
+    source->strong = false;
+    if (mesh->rest_positions) {
+        for (uint32_t t = 0; t < mesh->triangle_count; t++) area += areas[t];
+        const double scale = area > 0.0 && rest_area > 0.0 ? rest_area / area : 0.0;
+        for (uint32_t t = 0; t < mesh->triangle_count && scale > 0.0; t++) {
+            const double now = areas[t] * scale, least = shares[t] / ES_POINTS_STRETCH, most = shares[t] * ES_POINTS_STRETCH;
+            if (now > most) shares[t] = now / ES_POINTS_STRETCH;
+            else if (now < least) shares[t] = now * ES_POINTS_STRETCH;
+            else continue;
+            source->strong = true;
+        }
+        /* the whole: in steps of four, and not before it is beyond two */
+        for (; area > 2.0 * rest_area && rest_area > 0.0; rest_area *= 4.0) {}
+        for (; area < 0.5 * rest_area && area > 0.0; rest_area *= 0.25) {}
+    }
+    source->rest_area = rest_area;
+    source->areas = es_hash_bytes(mesh->triangle_count, shares, mesh->triangle_count * sizeof *shares);
+}
+
+/* ---- shares of the objects ------------------------------------------------------------------------------------------------------- */
+
+static double weight_of(const es_point_source* source, double largest, float detail)
+{
+    double weight = source->point_weight == 0.0f ? 1.0 : (double)source->point_weight;
+    if (!(weight > 0.0) || !(source->rest_area > 0.0)) return 0.0;
+    if (detail > 0.0f) weight *= (double)es_exp2(detail * es_log2((float)(largest / source->rest_area)));
+    return weight;
+}
+
+/* Rank c holds densities around the largest over 2^c. */
+static uint32_t rank_of(double weight, double densest)
+{
+    uint32_t rank = 0;
+    for (double x = weight * 1.4142135623730951; x < densest && rank + 1 < ES_POINT_RANKS; x *= 2.0) rank++;
+    return rank;
+}
+
+/* Sets mass, rank, begin and end of every source; false when there is nothing to stand for. */
+static bool share_out(es_scene_points* points, const es_point_request* request)
+{
+    double largest = 0.0, densest = 0.0, total = 0.0, area = 0.0;
+    for (uint32_t i = 0; i < points->source_count; i++) largest = points->sources[i].rest_area > largest ? points->sources[i].rest_area : largest;
+    for (uint32_t i = 0; i < points->source_count; i++) {
+        es_point_source* source = &points->sources[i];
+        const double weight = weight_of(source, largest, request->detail);
+        source->mass = weight * source->rest_area;
+        densest = weight > densest ? weight : densest;
+        total += source->mass;
+        if (weight > 0.0) area += source->rest_area;
+    }
+    points->rank_count = 0;
+    points->area = (float)area;
+    if (!(total > 0.0)) return false;
+    double before = 0.0;
+    for (uint32_t rank = 0; rank < ES_POINT_RANKS; rank++) {
+        double of_rank = 0.0, mass_before = before;
+        for (uint32_t i = 0; i < points->source_count; i++) {
+            es_point_source* source = &points->sources[i];
+            if (source->mass > 0.0 ? rank_of(source->mass / source->rest_area, densest) != rank : rank > 0) continue;
+            source->rank = rank;
+            source->begin = before / total * request->subset_size;
+            before += source->mass;
+            source->end = before / total * request->subset_size;
+            if (source->mass > 0.0) of_rank += source->rest_area;
+        }
+        if (!(before > mass_before)) continue;
+        points->rank_end[points->rank_count] = before / total * request->subset_size;
+        points->rank_width[points->rank_count++] = (float)root(of_rank * total / ((before - mass_before) * request->subset_size));
+    }
+    /* rounding must not leave a last point to nobody */
+    for (uint32_t i = 0; i < points->source_count; i++)
+        if (points->sources[i].end >= points->rank_end[points->rank_count - 1]) points->sources[i].end = request->subset_size;
+    points->rank_end[points->rank_count - 1] = request->subset_size;
+    return true;
+}
+
+/* Multiples of the two irrational steps of Roberts (2018), as fractions of 2^32: offsets of the subsets spread evenly. */
+static double offset_of(uint32_t subset) { return (double)(subset * 3242174889u + 0x80000000u) * (1.0 / 4294967296.0); }
+
+uint32_t es_scene_points_border(const es_scene_points* points, uint32_t subset, double place)
+{
+    if (place >= points->subset_size) return points->subset_size;
+    const double x = place - offset_of(subset);
+    if (!(x > 0.0)) return 0;
+    const uint32_t whole = (uint32_t)x;
+    return (double)whole < x ? whole + 1 : whole;
+}
+
+/* ---- places on an object -------------------------------------------------------------------------------------------------------- */
+
+typedef struct spreading { es_scene_points* points; const es_point_source* source; const double* before; } spreading;
+
+/* `before`: summed shares before each triangle; one more entry, the sum of all. */
+static void spread_over_triangles(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const spreading* job = user;
+    es_scene_points* points = job->points;
+    const es_point_source* source = job->source;
+    const uint32_t triangles = source->triangle_count;
+    const double scale = job->before[triangles] / (source->end - source->begin);
     for (uint32_t s = begin; s < end; s++) {
-        uint64_t t = 0;
-        uint32_t instance = 0;
-        for (uint32_t k = 0; k < points->subset_size; k++) {
-            size_t at = (size_t)s * points->subset_size + k;
-            uint32_t counter = 2 * (uint32_t)at;
-            double place = ((double)k + es_random_float(1, counter)) * step;
-            while (t + 1 < triangle_total && d->area_before[t + 1] <= place) t++;
-            while (t >= d->first_triangle[instance + 1]) instance++;
-            /* uniform on the triangle: fold the unit square along its diagonal */
-            uint32_t bits = es_random_u32(1, counter + 1);
-            float u = ((float)(bits & 0xffff) + 0.5f) * (1.0f / 65536.0f), v = ((float)(bits >> 16) + 0.5f) * (1.0f / 65536.0f);
-            if (u + v > 1.0f) {
-                u = 1.0f - u;
-                v = 1.0f - v;
+        const uint32_t first = es_scene_points_border(points, s, source->begin), last = es_scene_points_border(points, s, source->end);
+        uint32_t t = 0;
+        for (uint32_t k = first; k < last; k++) {
+            const double place = ((double)k + offset_of(s) - source->begin) * scale;
+            /* steps grow until they lead too far, then shrink */
+            uint32_t step = 1;
+            while (step < triangles - t && job->before[t + step] <= place) {
+                t += step;
+                step *= 2;
             }
-            points->triangle[at] = (uint32_t)(t - d->first_triangle[instance]);
+            for (; step; step /= 2)
+                if (step < triangles - t && job->before[t + step] <= place) t += step;
+            const double share = job->before[t + 1] - job->before[t];
+            float u = share > 0.0 ? (float)((place - job->before[t]) / share) : 0.5f;
+            float v = (float)((k * 2654435769u + s * 2447445414u) >> 8) * (1.0f / 16777216.0f);
+            u = es_clampf(u, 0.0f, 1.0f);
+            if (v > u) {
+                u *= 0.5f;
+                v -= u;
+            } else {
+                v *= 0.5f;
+                u -= v;
+            }
+            const size_t at = (size_t)s * points->subset_size + k;
+            points->triangle[at] = t;
             points->barycentric[at] = (uint32_t)(u * 65535.0f + 0.5f) | (uint32_t)(v * 65535.0f + 0.5f) << 16;
-            d->instance_of_point[at] = instance;
         }
     }
 }
 
-/* Runs in the order of instances, so that what one moving instance changes lies together in the list. */
-static es_result collect_runs(es_context* context, es_scene_points* points, const uint32_t* instance_of_point, uint32_t instance_count)
+static es_result spread(es_context* context, es_scene_points* points, const es_raster_mesh* mesh, es_point_source* source, es_arena* scratch)
 {
-    size_t total = (size_t)points->subset_size * points->subset_count, run_count = 0;
-    size_t* first = es_allocate_zero(context, ((size_t)instance_count + 1) * sizeof *first);
-    if (!first) return es_context_last_result(context);
-    for (size_t begin = 0; begin < total; begin += points->subset_size)
-        for (size_t i = begin; i < begin + points->subset_size; i++)
-            if (i == begin || instance_of_point[i] != instance_of_point[i - 1]) {
-                first[instance_of_point[i] + 1]++;
-                run_count++;
-            }
-    es_result result = ES_OK;
-    if (run_count > points->run_capacity) {
-        es_release(context, points->runs, points->run_capacity * sizeof *points->runs);
-        points->runs = es_allocate_array(context, run_count, sizeof *points->runs);
-        points->run_capacity = points->runs ? run_count : 0;
-        if (!points->runs) result = es_context_last_result(context);
+    es_arena_reset(scratch);
+    double* before = es_arena_allocate(scratch, (2 * (size_t)mesh->triangle_count + 1) * sizeof *before);
+    if (!before) return es_context_last_result(context);
+    weigh_triangles(context, mesh, source, before);
+    double sum = 0.0;
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        const double share = before[t];
+        before[t] = sum;
+        sum += share;
     }
-    if (!result) {
-        for (uint32_t i = 0; i < instance_count; i++) first[i + 1] += first[i];
-        for (size_t i = 0, border = points->subset_size; i < total;) {
-            uint32_t instance = instance_of_point[i];
-            size_t end = i + 1;
-            while (end < border && instance_of_point[end] == instance) end++;
-            points->runs[first[instance]++] = (es_point_run){(uint32_t)i, (uint32_t)(end - i), instance};
-            i = end;
-            if (i == border) border += points->subset_size;
-        }
-        points->run_count = run_count;
-    }
-    es_release(context, first, ((size_t)instance_count + 1) * sizeof *first);
-    return result;
+    before[mesh->triangle_count] = sum;
+    spreading job = {points, source, before};
+    es_parallel_for(context, points->subset_count, 1, spread_over_triangles, &job);
+    return ES_OK;
 }
+
+/* ---- memory ------------------------------------------------------------------------------------------------------------------------ */
 
 static void free_places(es_context* context, es_scene_points* points)
 {
@@ -110,7 +234,6 @@ static void free_places(es_context* context, es_scene_points* points)
     points->x = points->y = points->z = NULL;
     points->triangle = points->barycentric = NULL;
     points->subset_size = points->subset_count = 0;
-    points->run_count = 0;
 }
 
 static es_result allocate_places(es_context* context, es_scene_points* points, uint32_t subset_size, uint32_t subset_count)
@@ -128,114 +251,146 @@ static es_result allocate_places(es_context* context, es_scene_points* points, u
     return es_context_last_result(context);
 }
 
-static es_result distribute(es_context* context, es_scene_points* points, const es_draw_list* list, uint32_t subset_size, uint32_t subset_count)
+static void free_sources(es_context* context, es_scene_points* points)
 {
-    uint64_t triangle_total = 0;
-    for (uint32_t i = 0; i < list->instance_count; i++) triangle_total += list->instances[i].mesh->triangle_count;
-    es_arena scratch;
-    es_arena_init(&scratch, context, 1 << 20);
-    es_result result = ES_OK;
-    uint64_t* first_triangle = es_arena_allocate(&scratch, ((size_t)list->instance_count + 1) * sizeof *first_triangle);
-    double* area_before = first_triangle ? es_arena_allocate(&scratch, (triangle_total + 1) * sizeof *area_before) : NULL;
-    uint32_t* instance_of_point = area_before ? es_arena_allocate(&scratch, (size_t)subset_size * subset_count * sizeof *instance_of_point) : NULL;
-    if (!instance_of_point) result = es_context_last_result(context);
-    if (!result) {
-        double sum = 0.0;
-        uint64_t first = 0;
-        for (uint32_t i = 0; i < list->instance_count; i++) {
-            first_triangle[i] = first;
-            areas_of_instance(&list->instances[i], area_before + first, &sum);
-            first += list->instances[i].mesh->triangle_count;
-        }
-        first_triangle[list->instance_count] = first;
-        area_before[first] = sum;
-        points->area = (float)sum;
-        if (!(sum > 0.0)) {
-            free_places(context, points);
-        } else {
-            result = allocate_places(context, points, subset_size, subset_count);
-            if (!result) {
-                distribution d = {points, list, first_triangle, area_before, instance_of_point};
-                es_parallel_for(context, subset_count, 1, distribute_subsets, &d);
-                result = collect_runs(context, points, instance_of_point, list->instance_count);
-            }
-        }
-    }
-    es_arena_free(&scratch);
-    return result;
-}
-
-/* ---- placing: every frame, for what moved ---------------------------------------------------------------------------------------- */
-
-typedef struct placing { es_context* context; es_scene_points* points; const es_draw_list* list; const uint8_t* stale; } placing;
-
-static void place_runs(void* user, uint32_t begin, uint32_t end, uint32_t worker)
-{
-    placing* p = user;
-    const es_gi_kernels* kernels = es_gi_kernel_table(es_context_isa(p->context));
-    for (uint32_t r = begin; r < end; r++) {
-        const es_point_run* run = &p->points->runs[r];
-        if (!p->stale[run->instance]) continue;
-        const es_raster_instance* instance = &p->list->instances[run->instance];
-        size_t at = run->first;
-        kernels->place_points(instance->mesh, &instance->transform, p->points->triangle + at, p->points->barycentric + at, run->count, p->points->x + at, p->points->y + at, p->points->z + at);
-    }
-}
-
-static float volume_scale(const es_raster_instance* instance) { return es_absf(es_mat4_determinant3(&instance->transform)); }
-
-static bool same_triangles(const es_scene_points* points, const es_draw_list* list)
-{
-    if (points->source_count != list->instance_count) return false;
-    for (uint32_t i = 0; i < list->instance_count; i++) {
-        const struct es_point_source* source = &points->sources[i];
-        if (source->mesh != list->instances[i].mesh || source->triangle_count != list->instances[i].mesh->triangle_count) return false;
-        float now = volume_scale(&list->instances[i]);
-        if (now > 8.0f * source->volume_scale || source->volume_scale > 8.0f * now) return false;
-    }
-    return true;
-}
-
-es_result es_scene_points_update(es_context* context, es_scene_points* points, const es_draw_list* list, uint32_t subset_size, uint32_t subset_count, uint64_t* moved)
-{
-    *moved = 0;
-    bool fresh = points->subset_size != subset_size || points->subset_count != subset_count || !same_triangles(points, list);
-    if (fresh) {
-        es_release(context, points->sources, points->source_count * sizeof *points->sources);
-        points->source_count = 0;
-        points->sources = es_allocate_zero(context, list->instance_count * sizeof *points->sources);
-        if (!points->sources) return es_context_last_result(context);
-        es_result result = distribute(context, points, list, subset_size, subset_count);
-        if (result) {
-            es_release(context, points->sources, list->instance_count * sizeof *points->sources);
-            points->sources = NULL;
-            return result;
-        }
-        points->source_count = list->instance_count;
-    }
-    if (!points->subset_count || !list->instance_count) return ES_OK;
-    uint8_t* stale = es_allocate(context, list->instance_count);
-    if (!stale) return es_context_last_result(context);
-    for (uint32_t i = 0; i < list->instance_count; i++) {
-        const es_raster_instance* instance = &list->instances[i];
-        struct es_point_source source = {instance->mesh, instance->mesh->triangle_count, instance->mesh->revision, instance->transform, fresh ? volume_scale(instance) : points->sources[i].volume_scale};
-        stale[i] = fresh || points->sources[i].revision != source.revision || memcmp(&points->sources[i].transform, &source.transform, sizeof source.transform) != 0;
-        points->sources[i] = source;
-    }
-    for (size_t r = 0; r < points->run_count; r++)
-        if (stale[points->runs[r].instance]) *moved += points->runs[r].count;
-    if (*moved) {
-        placing p = {context, points, list, stale};
-        es_parallel_for(context, (uint32_t)points->run_count, 16, place_runs, &p);
-    }
-    es_release(context, stale, list->instance_count);
-    return ES_OK;
+    es_release(context, points->sources, points->source_count * sizeof *points->sources);
+    points->sources = NULL;
+    points->source_count = 0;
 }
 
 void es_scene_points_free(es_context* context, es_scene_points* points)
 {
     free_places(context, points);
-    es_release(context, points->runs, points->run_capacity * sizeof *points->runs);
-    es_release(context, points->sources, points->source_count * sizeof *points->sources);
+    free_sources(context, points);
     *points = (es_scene_points){0};
+}
+
+/* ---- the update ---------------------------------------------------------------------------------------------------------------------- */
+
+enum { AS_IT_WAS, MOVED, SPREAD };
+
+/* What an instance needs, its source brought up to it; its points are not touched yet. */
+static es_result examine(es_context* context, es_point_source* source, const es_raster_instance* instance, es_arena* scratch, uint8_t* need)
+{
+    const es_raster_mesh* mesh = instance->mesh;
+    const bool same_mesh = source->mesh == mesh && source->triangle_count == mesh->triangle_count && source->revision == mesh->revision;
+    *need = same_mesh && memcmp(&source->transform, &instance->transform, sizeof source->transform) == 0 ? AS_IT_WAS : MOVED;
+    if (*need == AS_IT_WAS && source->point_weight == instance->point_weight) return ES_OK;
+    double gram[6];
+    gram_of(&instance->transform, gram);
+    const bool same_areas = same_mesh && memcmp(gram, source->gram, sizeof gram) == 0;
+    const uint64_t areas = source->areas;
+    source->mesh = mesh;
+    source->triangle_count = mesh->triangle_count;
+    source->revision = mesh->revision;
+    source->transform = instance->transform;
+    source->point_weight = instance->point_weight;
+    memcpy(source->gram, gram, sizeof gram);
+    if (same_areas) return ES_OK;
+    es_arena_reset(scratch);
+    double* shares = es_arena_allocate(scratch, 2 * (size_t)mesh->triangle_count * sizeof *shares + 1);
+    if (!shares) return es_context_last_result(context);
+    weigh_triangles(context, mesh, source, shares);
+    if (source->areas != areas) *need = SPREAD;
+    return ES_OK;
+}
+
+typedef struct placing { es_context* context; es_scene_points* points; const es_draw_list* list; const uint32_t* stale; } placing;
+
+/* Item i: subset i mod subset_count of the stale instance i / subset_count. */
+static void place(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const placing* p = user;
+    const es_gi_kernels* kernels = es_gi_kernel_table(es_context_isa(p->context));
+    es_scene_points* points = p->points;
+    for (uint32_t i = begin; i < end; i++) {
+        const uint32_t index = p->stale[i / points->subset_count], s = i % points->subset_count;
+        const es_raster_instance* instance = &p->list->instances[index];
+        const uint32_t first = es_scene_points_border(points, s, points->sources[index].begin), last = es_scene_points_border(points, s, points->sources[index].end);
+        if (last <= first) continue;
+        const size_t at = (size_t)s * points->subset_size + first;
+        kernels->place_points(instance->mesh, &instance->transform, points->triangle + at, points->barycentric + at, last - first, points->x + at, points->y + at, points->z + at);
+    }
+}
+
+static uint64_t points_of(const es_scene_points* points, const es_point_source* source)
+{
+    uint64_t count = 0;
+    for (uint32_t s = 0; s < points->subset_count; s++) count += es_scene_points_border(points, s, source->end) - es_scene_points_border(points, s, source->begin);
+    return count;
+}
+
+static es_result update(es_context* context, es_scene_points* points, const es_draw_list* list, const es_point_request* request, es_arena* scratch, uint8_t* need, uint32_t* stale, uint64_t* moved)
+{
+    const bool fresh = points->subset_size != request->subset_size || points->subset_count != request->subset_count;
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        es_result result = examine(context, &points->sources[i], &list->instances[i], scratch, &need[i]);
+        if (result) return result;
+    }
+    double* ends = es_allocate_array(context, 2 * (size_t)list->instance_count, sizeof *ends);
+    if (!ends) return es_context_last_result(context);
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        ends[2 * i] = points->sources[i].begin;
+        ends[2 * i + 1] = points->sources[i].end;
+    }
+    const bool any = share_out(points, request);
+    es_result result = ES_OK;
+    bool shares_differ = fresh;
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        const es_point_source* source = &points->sources[i];
+        if (!fresh && ends[2 * i] == source->begin && ends[2 * i + 1] == source->end) continue;
+        need[i] = SPREAD;
+        shares_differ = true;
+    }
+    es_release(context, ends, 2 * (size_t)list->instance_count * sizeof *ends);
+    if (!any) {
+        free_places(context, points);
+        return ES_OK;
+    }
+    result = allocate_places(context, points, request->subset_size, request->subset_count);
+    if (result) return result;
+
+    uint32_t stale_count = 0;
+    for (uint32_t i = 0; i < list->instance_count && !result; i++) {
+        es_point_source* source = &points->sources[i];
+        if (need[i] == AS_IT_WAS) continue;
+        if (!stale_count) points->time++;
+        source->placed = points->time;
+        stale[stale_count++] = i;
+        const uint64_t count = points_of(points, source);
+        *moved += count;
+        if (need[i] != SPREAD || !count) continue;
+        points->redistributed += count;
+        result = spread(context, points, list->instances[i].mesh, source, scratch);
+    }
+    if (result) return result;
+    if (shares_differ) points->layout = points->time;
+    placing p = {context, points, list, stale};
+    es_parallel_for(context, stale_count * points->subset_count, 16, place, &p);
+    return ES_OK;
+}
+
+es_result es_scene_points_update(es_context* context, es_scene_points* points, const es_draw_list* list, const es_point_request* request, uint64_t* moved)
+{
+    *moved = points->redistributed = 0;
+    if (points->source_count != list->instance_count) {
+        free_sources(context, points);
+        points->rank_count = 0;
+        points->sources = es_allocate_zero(context, list->instance_count * sizeof *points->sources);
+        if (!points->sources) return es_context_last_result(context);
+        points->source_count = list->instance_count;
+    }
+    es_arena scratch;
+    es_arena_init(&scratch, context, 1 << 18);
+    uint8_t* need = es_allocate(context, list->instance_count);
+    uint32_t* stale = need ? es_allocate_array(context, list->instance_count, sizeof *stale) : NULL;
+    es_result result = stale ? update(context, points, list, request, &scratch, need, stale, moved) : es_context_last_result(context);
+    es_release(context, stale, list->instance_count * sizeof *stale);
+    es_release(context, need, list->instance_count);
+    es_arena_free(&scratch);
+    if (result) { /* sources are ahead of their points: next time, all of them anew */
+        free_places(context, points);
+        free_sources(context, points);
+    }
+    return result;
 }

@@ -195,7 +195,7 @@ static void test_maps_of_a_ceiling(void** state)
 {
     (void)state;
     enum { POINTS = 4000, SUBSETS = 3, LIGHTS = 8 };
-    es_scene_points points = {.subset_size = POINTS, .subset_count = SUBSETS, .area = 16};
+    es_scene_points points = {.subset_size = POINTS, .subset_count = SUBSETS, .area = 16, .rank_count = 1, .rank_end = {POINTS}, .rank_width = {0.06324555f}};
     points.x = malloc(POINTS * SUBSETS * 4);
     points.y = malloc(POINTS * SUBSETS * 4);
     points.z = malloc(POINTS * SUBSETS * 4);
