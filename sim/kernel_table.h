@@ -3,6 +3,7 @@
 #define EARTHSHINE_SIM_KERNEL_TABLE_H
 
 #include "platform/platform.h"
+#include "sim/deform.h"
 
 /* X(name, arguments) */
 #define ES_SIM_KERNELS(X)                                                                                        \
@@ -10,7 +11,15 @@
      * written up to the next one after end. indices: 3 per triangle */                                          \
     X(face_normals, (const float* positions, const uint32_t* indices, uint32_t begin, uint32_t end, float scale, float* faces)) \
     /* normals of vertex blocks [begin, end) as sim/normals.h has them */                                        \
-    X(vertex_normals, (const uint32_t* first_row, const uint32_t* rows, const float* faces, uint32_t begin, uint32_t end, float* normals))
+    X(vertex_normals, (const uint32_t* first_row, const uint32_t* rows, const float* faces, uint32_t begin, uint32_t end, float* normals)) \
+    /* below: vertex blocks [begin, end) */                                                                      \
+    X(skin, (const es_skin_job* job, uint32_t begin, uint32_t end))                                              \
+    /* vertices += weight × displacement */                                                                      \
+    X(morph, (float* vertices, const float* displacement, float weight, uint32_t begin, uint32_t end))           \
+    /* makes directions unit; those without one become `otherwise`. The fourth float stays */                    \
+    X(unit, (float* directions, const float* otherwise, uint32_t begin, uint32_t end))                           \
+    /* at least one block; bounds: least x y z and a float left alone, then the most */                          \
+    X(bounds, (const float* positions, uint32_t begin, uint32_t end, float* bounds))
 
 struct es_sim_kernels {
 #define ES_SIM_KERNEL_FIELD(name, arguments) void (*name) arguments;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "platform/maths.h"
+#include "sim/normals.h"
 
 /* 3 × triangle_count and 4 × vertex_count stay below 2^31, what 32-bit gathers can address */
 enum { MAX_VERTICES = 1 << 28, MAX_TRIANGLES = 1 << 28, STREAM_PAD = 8 };
@@ -13,7 +14,7 @@ static size_t padded(uint32_t vertex_count)
     size_t count = ((size_t)vertex_count + STREAM_PAD - 1) / STREAM_PAD * STREAM_PAD;
     return count ? count : STREAM_PAD;
 }
-static size_t stream_bytes(uint32_t vertex_count) { return padded(vertex_count) * 4 * sizeof(float); }
+size_t es_mesh_stream_bytes(uint32_t vertex_count) { return padded(vertex_count) * 4 * sizeof(float); }
 static size_t index_bytes(uint32_t triangle_count) { return ((size_t)triangle_count * 3 + 1) * sizeof(uint32_t); }
 
 static const char* label(const char* name) { return name ? name : ""; }
@@ -61,26 +62,43 @@ static bool direction_usable(const float* n)
     return squared > 1e-12 && squared < 1e12;
 }
 
+static void box_of(const float* p, uint32_t count, es_vec3 box[2])
+{
+    box[0] = box[1] = count ? es_v3(p[0], p[1], p[2]) : es_v3(0, 0, 0);
+    for (uint32_t v = 0; v < count; v++, p += 4) {
+        box[0] = es_v3(es_minf(box[0].x, p[0]), es_minf(box[0].y, p[1]), es_minf(box[0].z, p[2]));
+        box[1] = es_v3(es_maxf(box[1].x, p[0]), es_maxf(box[1].y, p[1]), es_maxf(box[1].z, p[2]));
+    }
+}
+
+void es_mesh_join_boxes(es_mesh_object* mesh)
+{
+    es_vec3 low = mesh->box[0], high = mesh->box[1];
+    if (mesh->raster.previous_positions) {
+        const es_vec3* before = mesh->previous_box;
+        low = es_v3(es_minf(low.x, before[0].x), es_minf(low.y, before[0].y), es_minf(low.z, before[0].z));
+        high = es_v3(es_maxf(high.x, before[1].x), es_maxf(high.y, before[1].y), es_maxf(high.z, before[1].z));
+    }
+    mesh->raster.bounds_min = low;
+    mesh->raster.bounds_max = high;
+}
+
 static void update_bounds(es_mesh_object* mesh)
 {
-    es_raster_mesh* raster = &mesh->raster;
-    es_vec3 low = {0, 0, 0}, high = {0, 0, 0};
-    for (int pass = 0; pass < (raster->previous_positions ? 2 : 1); pass++) {
-        const float* p = pass ? raster->previous_positions : raster->positions;
-        for (uint32_t v = 0; v < raster->vertex_count; v++, p += 4) {
-            if (pass == 0 && v == 0) low = high = es_v3(p[0], p[1], p[2]);
-            low = es_v3(es_minf(low.x, p[0]), es_minf(low.y, p[1]), es_minf(low.z, p[2]));
-            high = es_v3(es_maxf(high.x, p[0]), es_maxf(high.y, p[1]), es_maxf(high.z, p[2]));
-        }
-    }
-    raster->bounds_min = low;
-    raster->bounds_max = high;
+    box_of(mesh->positions, mesh->raster.vertex_count, mesh->box);
+    if (mesh->raster.previous_positions) box_of(mesh->raster.previous_positions, mesh->raster.vertex_count, mesh->previous_box);
+    es_mesh_join_boxes(mesh);
 }
 
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh)
 {
-    size_t bytes = stream_bytes(mesh->raster.vertex_count);
-    float* streams[] = {mesh->positions, mesh->previous, mesh->rest, mesh->rest_normals, mesh->normals, mesh->tangents, mesh->uvs, mesh->colors};
+    size_t bytes = es_mesh_stream_bytes(mesh->raster.vertex_count);
+    es_mesh_drive_free(world, mesh);
+    if (mesh->fans) {
+        es_vertex_fans_free(world->context, mesh->fans);
+        es_release(world->context, mesh->fans, sizeof *mesh->fans);
+    }
+    float* streams[] = {mesh->positions, mesh->previous, mesh->rest, mesh->rest_normals, mesh->rest_tangents, mesh->normals, mesh->tangents, mesh->uvs, mesh->colors};
     for (size_t i = 0; i < sizeof streams / sizeof streams[0]; i++) es_release(world->context, streams[i], bytes);
     es_release(world->context, mesh->indices, index_bytes(mesh->raster.triangle_count));
 }
@@ -105,7 +123,7 @@ static es_result check_desc(es_world* world, const es_mesh_desc* desc)
     for (size_t i = 0; i < (size_t)desc->triangle_count * 3; i++)
         if (desc->indices[i] >= desc->vertex_count)
             return es_fail(context, ES_INVALID_ARGUMENT, "mesh '%.64s': triangle %zu names vertex %u of %u", name, i / 3, desc->indices[i], desc->vertex_count);
-    return ES_OK;
+    return es_morph_desc_check(world, desc);
 }
 
 /* Fills an already referenced mesh object; false when memory ran out, to be freed by the caller. */
@@ -114,7 +132,7 @@ static bool fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc
     static const float position[4] = {0, 0, 0, 1}, zero[4] = {0, 0, 0, 0}, white[4] = {1, 1, 1, 1};
     es_context* context = world->context;
     uint32_t count = desc->vertex_count;
-    size_t bytes = stream_bytes(count);
+    size_t bytes = es_mesh_stream_bytes(count);
     mesh->raster.vertex_count = count;
     mesh->raster.triangle_count = desc->triangle_count;
     mesh->raster.revision = es_context_next_serial(world->context);
@@ -165,7 +183,7 @@ static bool fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc
     raster->colors = mesh->colors;
     raster->indices = mesh->indices;
     update_bounds(mesh);
-    return true;
+    return es_morphs_fill(world, mesh, desc);
 }
 
 es_result es_world_add_mesh(es_world* world, const es_mesh_desc* desc, es_mesh* mesh)
@@ -197,7 +215,7 @@ es_result es_world_destroy_mesh(es_world* world, es_mesh mesh)
     es_mesh_object* object = es_world_object(world, ES_OBJECT_MESH, mesh.id);
     if (!object) return ES_STALE_HANDLE;
     if (object->object.references)
-        return es_misuse(world->context, ES_WRONG_STATE, "mesh '%.64s' cannot be destroyed: %u instances use it", label(object->object.name), object->object.references);
+        return es_misuse(world->context, ES_WRONG_STATE, "mesh '%.64s' cannot be destroyed: %u instances or skins use it", label(object->object.name), object->object.references);
     es_mesh_object_free(world, object);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_MESH], &object->object);
     return ES_OK;
@@ -205,7 +223,7 @@ es_result es_world_destroy_mesh(es_world* world, es_mesh mesh)
 
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh)
 {
-    size_t bytes = stream_bytes(mesh->raster.vertex_count);
+    size_t bytes = es_mesh_stream_bytes(mesh->raster.vertex_count);
     if (!mesh->previous) {
         mesh->previous = es_allocate(world->context, bytes);
         if (!mesh->previous) return false;
@@ -232,6 +250,7 @@ es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* posit
     const char* name = label(object->object.name);
     size_t count = object->raster.vertex_count;
     if (!positions) return es_misuse(world->context, ES_INVALID_ARGUMENT, "mesh '%.64s': new positions must not be NULL", name);
+    if (object->drive) return es_fail(world->context, ES_WRONG_STATE, "mesh '%.64s': its vertices follow its skin or morph targets", name);
     if (normals && !object->normals) return es_fail(world->context, ES_INVALID_ARGUMENT, "mesh '%.64s' stores no normals: pass NULL", name);
     if (!es_all_within(positions, 3 * count, ES_WORLD_EXTENT) || (normals && !es_all_within(normals, 3 * count, ES_WORLD_EXTENT)))
         return es_fail(world->context, ES_INVALID_ARGUMENT, "mesh '%.64s': new vertices must be finite and within 1e9", name);
@@ -243,7 +262,7 @@ es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* posit
                   (normals && memcmp(object->normals + 4 * v, normals + 3 * v, 3 * sizeof(float)) != 0);
     if (!differs) return ES_OK;
     if (!object->moving && world->stepped) { /* the first change since the step began: what is there now is last frame's */
-        memcpy(object->previous, object->positions, stream_bytes(object->raster.vertex_count));
+        memcpy(object->previous, object->positions, es_mesh_stream_bytes(object->raster.vertex_count));
         object->raster.previous_positions = object->previous;
         object->moving = true;
     }
@@ -259,6 +278,45 @@ es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* posit
     return ES_OK;
 }
 
+es_result es_world_recompute_normals(es_world* world, es_mesh mesh)
+{
+    if (!world) return ES_INVALID_ARGUMENT;
+    es_mesh_object* object = es_world_object(world, ES_OBJECT_MESH, mesh.id);
+    if (!object) return ES_STALE_HANDLE;
+    const char* name = label(object->object.name);
+    if (!object->normals) return ES_OK; /* the triangles' own are used */
+    if (object->drive) return es_fail(world->context, ES_WRONG_STATE, "mesh '%.64s': its vertices follow its skin or morph targets", name);
+    if (!es_mesh_make_deformable(world, object)) return es_context_last_result(world->context);
+    es_fp_environment environment = es_fp_enter();
+    bool good = es_mesh_recompute_normals(world, object);
+    es_fp_leave(environment);
+    if (!good) return es_context_last_result(world->context);
+    if (object->object.references) world->geometry_touched = world->list_dirty = true;
+    return ES_OK;
+}
+
+bool es_mesh_recompute_normals(es_world* world, es_mesh_object* mesh)
+{
+    es_context* context = world->context;
+    if (!mesh->fans) {
+        es_vertex_fans* fans = es_allocate(context, sizeof *fans);
+        size_t bytes = (mesh->raster.vertex_count + (size_t)1) * sizeof(uint32_t);
+        uint32_t* welded = fans ? es_allocate(context, bytes) : NULL;
+        bool good = welded && es_weld_vertices(context, mesh->rest, mesh->rest_normals, mesh->raster.vertex_count, welded) &&
+                    es_vertex_fans_make(context, mesh->indices, mesh->raster.triangle_count, mesh->raster.vertex_count, welded, fans);
+        es_release(context, welded, bytes);
+        if (!good) {
+            es_release(context, fans, sizeof *fans);
+            return false;
+        }
+        mesh->fans = fans;
+    }
+    es_normals_recompute(context, mesh->fans, mesh->indices, mesh->positions, mesh->box[0], mesh->box[1], mesh->normals);
+    mesh->deformed = true;
+    mesh->raster.revision = es_context_next_serial(context);
+    return true;
+}
+
 void es_meshes_settle(es_world* world)
 {
     const es_slots* slots = &world->slots[ES_OBJECT_MESH];
@@ -267,13 +325,17 @@ void es_meshes_settle(es_world* world)
         if (!mesh || !mesh->moving) continue;
         mesh->moving = false;
         mesh->raster.previous_positions = NULL;
-        update_bounds(mesh);
+        es_mesh_join_boxes(mesh);
         world->list_dirty = true;
     }
 }
 
 void es_mesh_restored(es_world* world, es_mesh_object* mesh)
 {
+    if (mesh->drive) {
+        mesh->drive->stale = world->poses_dirty = true;
+        return;
+    }
     mesh->raster.revision = es_context_next_serial(world->context);
     mesh->raster.previous_positions = mesh->moving ? mesh->previous : NULL;
     update_bounds(mesh);
@@ -282,5 +344,6 @@ void es_mesh_restored(es_world* world, es_mesh_object* mesh)
 const es_raster_mesh* es_world_mesh(const es_world* world, es_mesh mesh)
 {
     es_mesh_object* object = world ? es_world_object(world, ES_OBJECT_MESH, mesh.id) : NULL;
+    if (object && object->drive) es_world_refresh(world);
     return object ? &object->raster : NULL;
 }

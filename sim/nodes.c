@@ -102,7 +102,10 @@ es_result es_world_get_node_matrix(const es_world* world, es_node node, es_mat4*
     if (!world || !to_world) return ES_INVALID_ARGUMENT;
     es_node_object* object = node_object(world, node);
     if (!object) return ES_STALE_HANDLE;
-    es_world_refresh(world);
+    /* the nodes alone: vertices that hang on them can wait for somebody who wants to see them */
+    es_fp_environment environment = es_fp_enter();
+    es_nodes_refresh((es_world*)world);
+    es_fp_leave(environment);
     *to_world = object->world;
     return ES_OK;
 }
@@ -235,5 +238,5 @@ void es_nodes_refresh(es_world* world)
         if (node->fresh || !world->stepped) es_node_settle(node);
         node->fresh = false;
     }
-    if (any) world->list_dirty = world->lights_dirty = world->camera_dirty = world->nodes_moving = true;
+    if (any) world->list_dirty = world->lights_dirty = world->camera_dirty = world->nodes_moving = world->poses_dirty = true;
 }

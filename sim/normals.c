@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "platform/maths.h"
+#include "platform/random.h"
 #include "sim/kernel_table.h"
 
 static uint32_t block_count(uint32_t vertex_count) { return (vertex_count + 7) / 8; }
@@ -68,6 +69,28 @@ void es_vertex_fans_free(es_context* context, es_vertex_fans* fans)
     es_release(context, fans->rows, (fans->row_count + 1) * 8 * sizeof *fans->rows);
     es_release(context, fans->faces, face_floats(fans->triangle_count) * sizeof *fans->faces);
     *fans = (es_vertex_fans){0};
+}
+
+bool es_weld_vertices(es_context* context, const float* positions, const float* normals, uint32_t vertex_count, uint32_t* welded)
+{
+    uint64_t capacity = 16;
+    while (capacity < 2 * (uint64_t)vertex_count) capacity *= 2;
+    uint32_t* table = es_allocate_zero(context, capacity * sizeof *table); /* vertex + 1 */
+    if (!table) return false;
+    for (uint32_t v = 0; v < vertex_count; v++) {
+        float key[6];
+        memcpy(key, positions + 4 * (size_t)v, 3 * sizeof(float));
+        memcpy(key + 3, normals + 4 * (size_t)v, 3 * sizeof(float));
+        uint64_t at = es_hash_bytes(0, key, sizeof key) & (capacity - 1);
+        for (; table[at]; at = (at + 1) & (capacity - 1)) {
+            size_t other = table[at] - 1;
+            if (memcmp(positions + 4 * other, key, 3 * sizeof(float)) == 0 && memcmp(normals + 4 * other, key + 3, 3 * sizeof(float)) == 0) break;
+        }
+        if (!table[at]) table[at] = v + 1;
+        welded[v] = table[at] - 1;
+    }
+    es_release(context, table, capacity * sizeof *table);
+    return true;
 }
 
 typedef struct normals_loop {

@@ -25,6 +25,10 @@ typedef struct es_vertex_fans {
 bool es_vertex_fans_make(es_context* context, const uint32_t* indices, uint32_t triangle_count, uint32_t vertex_count, const uint32_t* welded, es_vertex_fans* fans);
 void es_vertex_fans_free(es_context* context, es_vertex_fans* fans);
 
+/* For `welded`: two vertices share a normal when positions and normals (4 floats each) are equal bit for bit, as along the seams of texture
+ * coordinates; not where the surface has a hard edge. False after es_fail. */
+bool es_weld_vertices(es_context* context, const float* positions, const float* normals, uint32_t vertex_count, uint32_t* welded);
+
 /* positions and normals: 4 floats per vertex, padded to a multiple of eight vertices as es_raster_mesh has them; `indices` are those the
  * fans were made of. Positions lie within ±1e9; low … high is a box round them: lengths are scaled by a power of two to its size, so that a
  * mesh has the same normals at every scale. A vertex at which no triangle has an area gets +y. Runs on the context's threads, and writes

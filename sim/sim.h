@@ -28,6 +28,7 @@ typedef struct es_camera { uint32_t id; } es_camera;
 typedef struct es_light { uint32_t id; } es_light;
 typedef struct es_clip { uint32_t id; } es_clip;
 typedef struct es_mover { uint32_t id; } es_mover;
+typedef struct es_skin { uint32_t id; } es_skin;
 
 /* ---- the world itself ------------------------------------------------------------------------------------------------------------ */
 
@@ -104,6 +105,7 @@ ES_API es_result es_world_set_material(es_world* world, es_material material, co
 ES_API es_result es_world_get_material(const es_world* world, es_material material, es_material_desc* desc);
 
 /* Arrays are copied. Triangles with an index out of range, or vertices that are not finite or beyond 1e9 m, are refused. */
+typedef struct es_morph_target { const float *positions, *normals, *tangents; /* displacements, 3 per vertex each; NULL: none */ } es_morph_target;
 typedef struct es_mesh_desc {
     const char* name;
     uint32_t vertex_count, triangle_count;
@@ -114,12 +116,47 @@ typedef struct es_mesh_desc {
     const float* uv1;         /* 2 per vertex or NULL */
     const float* colors;      /* 4 per vertex, linear, or NULL */
     const uint32_t* indices;  /* 3 per triangle */
+    uint32_t target_count;    /* up to 65535 morph targets */
+    const es_morph_target* targets;
+    const float* weights;     /* of the targets, within ±1e6, or NULL: zeros */
     bool flat_normals;        /* with normals NULL: none are stored and the triangle's own is used (glTF's rule) */
 } es_mesh_desc;
 ES_API es_result es_world_add_mesh(es_world* world, const es_mesh_desc* desc, es_mesh* mesh);
-/* Moves the vertices (3 floats each): the old ones become last frame's. normals NULL: kept. Call it from the step function. */
+/* Moves the vertices (3 floats each): the old ones become last frame's. normals NULL: kept. Call it from the step function.
+ * WRONG_STATE for a mesh with morph targets or a skin: its vertices follow these. */
 ES_API es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* positions, const float* normals);
+/* Smooth normals of the present vertices, weighted by area. Vertices that had the same place and normal when the mesh was added share one.
+ * Nothing happens to a mesh that stores no normals. Runs on the context's threads. */
+ES_API es_result es_world_recompute_normals(es_world* world, es_mesh mesh);
 ES_API const es_raster_mesh* es_world_mesh(const es_world* world, es_mesh mesh);
+
+/* ---- what moves a mesh's vertices ------------------------------------------------------------------------------------------------------ */
+
+/* Of a mesh's morph targets: vertex = base + sum of weight × displacement, in the targets' order, positions, normals and tangents alike
+ * (glTF 2.0 §3.7.2.2); a target of weight zero costs nothing. `count` must be the number of targets, weights within ±1e6. */
+ES_API es_result es_world_set_morph_weights(es_world* world, es_mesh mesh, const float* weights, uint32_t count);
+/* *count: capacity in, number of targets out; weights NULL asks for it. */
+ES_API es_result es_world_get_morph_weights(const es_world* world, es_mesh mesh, float* weights, uint32_t* count);
+
+/* A skin moves the vertices of one mesh by linear blends of joints' matrices (glTF 2.0 §3.7.3): vertex = sum of weight × (joint to the node's axes) ×
+ * (inverse bind matrix) × morphed vertex; normals by the cofactors of the blend. What hangs on it is computed when it is looked at, on the
+ * context's threads. One mesh has one skin at most; instances of a skinned mesh belong on the skin's node. A joint whose matrix leaves 1e8 (its
+ * translation: 1e9 m), or any while the node's axes have no inverse, stands in its bind pose. */
+typedef struct es_skin_desc {
+    const char* name;
+    es_mesh mesh;
+    es_node node;                  /* whose axes the vertices are written in; best the joints' nearest common ancestor. Null: the world's */
+    uint32_t joint_count;          /* 1 … 65535 */
+    const es_node* joints;
+    const es_mat4* inverse_binds;  /* per joint: from the mesh as added to the joint's axes; NULL: identities */
+    uint32_t influences;           /* per vertex, 1 … 16 */
+    const uint32_t* vertex_joints; /* `influences` per vertex, indices into `joints`; not looked at where the weight is zero */
+    const float* vertex_weights;   /* the same, not negative; made to sum to one. A vertex without weights stays where it is */
+} es_skin_desc;
+typedef struct es_skin_state { es_mesh mesh; es_node node; uint32_t joint_count; const es_node* joints; } es_skin_state;
+/* Arrays are copied. */
+ES_API es_result es_world_add_skin(es_world* world, const es_skin_desc* desc, es_skin* skin);
+ES_API es_result es_world_get_skin(const es_world* world, es_skin skin, es_skin_state* state);
 
 /* ---- the node tree ------------------------------------------------------------------------------------------------------------------------ */
 
@@ -287,8 +324,22 @@ ES_API es_result es_world_destroy_instance(es_world* world, es_instance instance
 ES_API es_result es_world_destroy_camera(es_world* world, es_camera camera);
 ES_API es_result es_world_destroy_light(es_world* world, es_light light);
 ES_API es_result es_world_destroy_clip(es_world* world, es_clip clip);
+/* The mesh goes back to its shape without it. */
+ES_API es_result es_world_destroy_skin(es_world* world, es_skin skin);
 
-typedef enum es_object_kind { ES_OBJECT_TEXTURE, ES_OBJECT_MATERIAL, ES_OBJECT_MESH, ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_CLIP, ES_OBJECT_MOVER, ES_OBJECT_KINDS } es_object_kind;
+typedef enum es_object_kind {
+    ES_OBJECT_TEXTURE,
+    ES_OBJECT_MATERIAL,
+    ES_OBJECT_MESH,
+    ES_OBJECT_NODE,
+    ES_OBJECT_INSTANCE,
+    ES_OBJECT_CAMERA,
+    ES_OBJECT_LIGHT,
+    ES_OBJECT_CLIP,
+    ES_OBJECT_MOVER,
+    ES_OBJECT_SKIN,
+    ES_OBJECT_KINDS
+} es_object_kind;
 /* Handles of all objects of a kind in creation-slot order; *count is the capacity in, the number of objects out; ids NULL asks for it. */
 ES_API es_result es_world_enumerate(const es_world* world, es_object_kind kind, uint32_t* ids, size_t* count);
 /* "" when unnamed; NULL for a stale handle. */

@@ -141,6 +141,20 @@ static void visit_light(es_world* world, state_io* io, es_light_object* light)
     }
 }
 
+/* Checked one by one: what is there must not be touched before everything is known to be good. */
+static void visit_numbers(state_io* io, float* numbers, size_t count, float limit)
+{
+    if (io->mode != CHECK) {
+        visit_floats(io, numbers, count);
+        return;
+    }
+    for (size_t i = 0; i < count && io->good; i++) {
+        float number = 0;
+        visit_floats(io, &number, 1);
+        io->good &= es_within(number, -limit, limit);
+    }
+}
+
 static void visit_stream(state_io* io, float* stream, size_t floats)
 {
     if (io->mode != CHECK) {
@@ -154,8 +168,27 @@ static void visit_stream(state_io* io, float* stream, size_t floats)
     }
 }
 
+/* What decides where a driven mesh's vertices are and were; they themselves follow. */
+static void visit_driven_mesh(es_world* world, state_io* io, es_mesh_object* mesh)
+{
+    es_mesh_drive* drive = mesh->drive;
+    const es_skin_object* skin = es_slots_get(&world->slots[ES_OBJECT_SKIN], drive->skin);
+    bool moving = mesh->moving;
+    visit_flag(io, &moving);
+    visit_numbers(io, drive->weights, drive->target_count, ES_MORPH_WEIGHT);
+    if (moving) visit_numbers(io, drive->previous_weights, drive->target_count, ES_MORPH_WEIGHT);
+    if (moving && skin) visit_numbers(io, skin->previous_palette, (size_t)skin->joint_count * ES_JOINT_FLOATS, ES_WORLD_EXTENT);
+    if (io->mode != APPLY) return;
+    mesh->moving = moving;
+    es_mesh_restored(world, mesh);
+}
+
 static void visit_mesh(es_world* world, state_io* io, es_mesh_object* mesh)
 {
+    if (mesh->drive) {
+        visit_driven_mesh(world, io, mesh);
+        return;
+    }
     bool deformed = mesh->deformed, moving = mesh->moving;
     size_t floats = 4 * (((size_t)mesh->raster.vertex_count + 7) / 8 * 8);
     if (floats == 0) floats = 32;
@@ -293,11 +326,17 @@ static uint64_t content_signature(const es_world* world)
         const es_slots* slots = &world->slots[kind];
         for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
             const es_object* object = es_slots_at(slots, slot);
-            uint32_t words[3] = {object ? object->id : 0, 0, 0};
+            uint32_t words[4] = {object ? object->id : 0, 0, 0, 0};
             if (object && kind == ES_OBJECT_MESH) {
                 const es_raster_mesh* mesh = &((const es_mesh_object*)object)->raster;
                 words[1] = mesh->vertex_count;
                 words[2] = mesh->triangle_count;
+                const es_mesh_drive* drive = ((const es_mesh_object*)object)->drive;
+                words[3] = drive ? drive->target_count + 1 : 0;
+            }
+            if (object && kind == ES_OBJECT_SKIN) {
+                words[1] = ((const es_skin_object*)object)->mesh.id;
+                words[2] = ((const es_skin_object*)object)->joint_count;
             }
             hash = es_hash_bytes(hash, words, sizeof words);
         }

@@ -18,6 +18,7 @@ static const struct { const char* name; size_t size; uint32_t limit; } kinds[ES_
     [ES_OBJECT_LIGHT] = {"light", sizeof(es_light_object), ES_SLOT_LIMIT},
     [ES_OBJECT_CLIP] = {"clip", sizeof(es_clip_object), ES_SLOT_LIMIT},
     [ES_OBJECT_MOVER] = {"mover", sizeof(es_mover_object), ES_SLOT_LIMIT},
+    [ES_OBJECT_SKIN] = {"skin", sizeof(es_skin_object), ES_SLOT_LIMIT},
 };
 
 void* es_world_object(const es_world* world, es_object_kind kind, uint32_t id)
@@ -99,6 +100,10 @@ void es_world_destroy(es_world* world)
         es_texture_object* texture = es_slots_at(&world->slots[ES_OBJECT_TEXTURE], slot);
         if (texture) es_texture_image_destroy(context, &texture->image);
     }
+    for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_SKIN].slot_count; slot++) {
+        es_skin_object* skin = es_slots_at(&world->slots[ES_OBJECT_SKIN], slot);
+        if (skin) es_skin_object_free(world, skin);
+    }
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_MESH].slot_count; slot++) {
         es_mesh_object* mesh = es_slots_at(&world->slots[ES_OBJECT_MESH], slot);
         if (mesh) es_mesh_object_free(world, mesh);
@@ -133,9 +138,10 @@ void es_world_set_step_function(es_world* world, es_world_step_function function
 void es_world_refresh(const es_world* world)
 {
     es_world* w = (es_world*)world;
-    if (!(w->nodes_dirty || w->order_dirty || w->list_dirty || w->lights_dirty || w->camera_dirty)) return;
+    if (!(w->nodes_dirty || w->order_dirty || w->poses_dirty || w->list_dirty || w->lights_dirty || w->camera_dirty)) return;
     es_fp_environment environment = es_fp_enter();
     es_nodes_refresh(w);
+    es_meshes_refresh(w);
     if (es_origin_refresh(w)) w->list_dirty = w->lights_dirty = w->camera_dirty = true;
     es_draw_list_refresh(w);
     es_lights_refresh(w);

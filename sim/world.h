@@ -6,6 +6,7 @@
 #ifndef EARTHSHINE_SIM_WORLD_H
 #define EARTHSHINE_SIM_WORLD_H
 
+#include "sim/deform.h"
 #include "sim/sim.h"
 #include "sim/slots.h"
 
@@ -15,6 +16,8 @@ extern "C" {
 
 /* |coordinate|, |scale| and the like at most: squares of differences stay finite in float */
 #define ES_WORLD_EXTENT 1e9f
+/* |weight of a morph target| at most */
+#define ES_MORPH_WEIGHT 1e6f
 
 typedef struct es_texture_object { es_object object; es_texture_image image; } es_texture_object;
 
@@ -24,11 +27,26 @@ typedef struct es_mesh_object {
     es_object object;
     es_raster_mesh raster;   /* previous_positions is set only while it differs from positions */
     float *positions, *previous, *normals, *tangents, *uvs, *colors;
-    float *rest, *rest_normals; /* as added; kept from the first deformation on, for restoring */
+    float *rest, *rest_normals, *rest_tangents; /* as added; kept from the first deformation on, for restoring */
+    es_vec3 box[2], previous_box[2]; /* of positions and, while there are any, of previous_positions */
+    struct es_vertex_fans* fans;     /* from the first recomputed normals on */
+    es_mesh_drive* drive;    /* NULL: no skin or morph target moves it */
     uint32_t* indices;
-    bool deformed;           /* ever: its vertices are state, not an asset */
+    bool deformed;           /* ever, by es_world_deform_mesh: its vertices are state, not an asset */
     bool moving;             /* deformed since the step began or at the one before */
 } es_mesh_object;
+
+typedef struct es_skin_object {
+    es_object object;
+    es_mesh mesh;
+    es_node node;
+    uint32_t joint_count;
+    es_node* joints;
+    uint8_t* ways;           /* parents between joint and node, see sim/skins.c */
+    es_mat4* inverse_binds;
+    float *palette, *next_palette, *previous_palette; /* joint_count + 1 matrices of the present vertices, of those being made, of last frame's */
+    es_skin_weights weights;
+} es_skin_object;
 
 typedef struct es_node_object {
     es_object object;
@@ -92,6 +110,9 @@ struct es_world {
     uint32_t* order;               /* node slots, parents before children: by depth, then by slot */
     size_t order_capacity, order_count;
     bool order_dirty, nodes_dirty, nodes_moving;
+
+    uint32_t driven_meshes;        /* that skins or morph targets move */
+    bool poses_dirty;              /* a node, a morph weight or a skin differs since their vertices were computed */
 
     es_raster_instance* drawn;     /* of list */
     size_t drawn_capacity;
@@ -162,6 +183,17 @@ bool es_mover_numbers_valid(const es_mover_desc* desc);
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
 void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
+size_t es_mesh_stream_bytes(uint32_t vertex_count);
+/* Of a deformable mesh that has normals, from its present positions; false after es_fail. */
+bool es_mesh_recompute_normals(es_world* world, es_mesh_object* mesh);
+void es_mesh_join_boxes(es_mesh_object* mesh);
+bool es_mesh_make_driven(es_world* world, es_mesh_object* mesh);
+void es_mesh_drive_free(es_world* world, es_mesh_object* mesh);
+es_result es_morph_desc_check(es_world* world, const es_mesh_desc* desc);
+bool es_morphs_fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc);
+void es_skin_object_free(es_world* world, es_skin_object* skin);
+/* Vertices of the driven meshes; nodes must have been refreshed. */
+void es_meshes_refresh(es_world* world);
 bool es_camera_desc_resolve(es_world* world, const es_camera_desc* desc, es_camera_desc* resolved);
 /* Of a saved state: does it hold what es_world_set_environment would take? */
 bool es_environment_numbers_valid(const float radiance[3], float rotation);

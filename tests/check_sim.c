@@ -175,6 +175,139 @@ static void normals_scale(void** state)
     free(other.memory);
 }
 
+/* ---- deformation ------------------------------------------------------------------------------------------------------------------ */
+
+static float wild(float scale)
+{
+    static const float odd[] = {0.0f, -0.0f, 1e9f, -1e9f, 1e-30f, -1e-38f};
+    uint32_t r = random_bits();
+    return r % 16 == 0 ? odd[r / 16 % 6] : uniform(-scale, scale);
+}
+
+static floats random_floats(size_t count, float scale)
+{
+    floats f = new_floats(count);
+    for (size_t i = 0; i < count; i++) at(f)[i] = wild(scale);
+    return f;
+}
+
+typedef struct random_skin { es_skin_weights weights; floats palette; uint32_t joints; } random_skin;
+
+static random_skin make_skin(uint32_t blocks, uint32_t joints, float scale)
+{
+    random_skin s = {.joints = joints};
+    s.weights.blocks = blocks;
+    s.weights.first_row = malloc((blocks + 1) * sizeof(uint32_t));
+    for (uint32_t b = 0; b <= blocks; b++) {
+        s.weights.first_row[b] = (uint32_t)s.weights.row_count;
+        s.weights.row_count += b < blocks ? 1 + random_bits() % 8 : 0;
+    }
+    s.weights.joints = malloc(s.weights.row_count * 8 * sizeof(uint32_t));
+    s.weights.weights = malloc(s.weights.row_count * 8 * sizeof(float));
+    for (size_t i = 0; i < s.weights.row_count * 8; i++) {
+        s.weights.joints[i] = random_bits() % (joints + 1);
+        s.weights.weights[i] = random_bits() % 4 ? uniform(0, 1) : 0.0f;
+    }
+    s.palette = random_floats((joints + 1) * (size_t)ES_JOINT_FLOATS, scale);
+    return s;
+}
+
+static void free_skin(random_skin s)
+{
+    free(s.weights.first_row);
+    free(s.weights.joints);
+    free(s.weights.weights);
+    free(s.palette.memory);
+}
+
+static void check_skin(void** state)
+{
+    static const uint32_t blocks[] = {1, 2, 3, 17, 64};
+    static const float scales[] = {1, 1e4f, 1e8f, 1e-12f};
+    for (uint32_t trial = 0; trial < 5 * 4 * 3; trial++) {
+        uint32_t count = blocks[trial % 5];
+        random_skin skin = make_skin(count, 1 + random_bits() % 70, scales[trial / 5 % 4]);
+        floats from[ES_STREAMS], expected[ES_STREAMS], result[ES_STREAMS];
+        for (int s = 0; s < ES_STREAMS; s++) {
+            from[s] = random_floats(count * 32, s == 0 ? 100 : 1);
+            expected[s] = new_floats(count * 32);
+            result[s] = new_floats(count * 32);
+        }
+        uint32_t streams = 1 + trial / 20;
+        for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
+            if (!runs(isa)) continue;
+            floats* to = isa == ES_ISA_SCALAR ? expected : result;
+            es_skin_job job = {.weights = &skin.weights, .palette = at(skin.palette)};
+            for (uint32_t s = 0; s < streams; s++) {
+                job.from[s] = at(from[s]);
+                job.to[s] = at(to[s]);
+                if (trial % 2) { /* in place */
+                    memcpy(at(to[s]), at(from[s]), count * 32 * sizeof(float));
+                    job.from[s] = at(to[s]);
+                }
+            }
+            es_sim_kernel_table((es_isa)isa)->skin(&job, 0, count);
+            for (uint32_t s = 0; s < streams; s++) {
+                check_guards(to[s]);
+                check_guards(from[s]);
+                assert_memory_equal(at(expected[s]), at(to[s]), count * 32 * sizeof(float));
+                for (size_t i = 0; s > 0 && i < count * 8; i++) {
+                    const float* n = at(to[s]) + 4 * i;
+                    assert_true(isfinite(n[0]) && isfinite(n[1]) && isfinite(n[2]));
+                    assert_memory_equal(n + 3, at(from[s]) + 4 * i + 3, sizeof(float));
+                }
+            }
+        }
+        for (int s = 0; s < ES_STREAMS; s++) {
+            free(from[s].memory);
+            free(expected[s].memory);
+            free(result[s].memory);
+        }
+        free_skin(skin);
+    }
+}
+
+static void check_morph(void** state)
+{
+    for (uint32_t trial = 0; trial < 24; trial++) {
+        uint32_t blocks = 1 + random_bits() % 40, begin = random_bits() % blocks, end = begin + 1 + random_bits() % (blocks - begin);
+        floats base = random_floats(blocks * 32, 3), moved = random_floats(blocks * 32, 3), results[2] = {new_floats(blocks * 32), new_floats(blocks * 32)}, bounds[2] = {new_floats(8), new_floats(8)};
+        float weight = wild(2);
+        for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
+            if (!runs(isa)) continue;
+            const es_sim_kernels* kernels = es_sim_kernel_table((es_isa)isa);
+            floats to = results[isa != ES_ISA_SCALAR], box = bounds[isa != ES_ISA_SCALAR];
+            memcpy(at(to), at(base), base.count * sizeof(float));
+            kernels->morph(at(to), at(moved), weight, begin, end);
+            for (size_t i = 0; i < base.count; i++) {
+                float sum = at(base)[i] + weight * at(moved)[i];
+                bool inside = i >= begin * 32 && i < end * 32;
+                assert_memory_equal(inside ? &sum : at(base) + i, at(to) + i, sizeof sum);
+            }
+            kernels->unit(at(to), at(base), begin, end);
+            check_guards(to);
+            assert_memory_equal(at(results[0]), at(to), base.count * sizeof(float));
+            kernels->bounds(at(base), begin, end, at(box));
+            check_guards(box);
+            for (int k = 0; k < 3; k++) {
+                float low = at(base)[begin * 32 + (size_t)k], high = low;
+                for (size_t v = begin * 8; v < end * 8; v++) {
+                    low = fminf(low, at(base)[4 * v + (size_t)k]);
+                    high = fmaxf(high, at(base)[4 * v + (size_t)k]);
+                }
+                assert_true(at(box)[k] == low && at(box)[4 + k] == high);
+            }
+            assert_memory_equal(at(bounds[0]), at(box), 8 * sizeof(float));
+        }
+        for (int i = 0; i < 2; i++) {
+            free(results[i].memory);
+            free(bounds[i].memory);
+        }
+        free(base.memory);
+        free(moved.memory);
+    }
+}
+
 /* ---- timing ---------------------------------------------------------------------------------------------------------------------- */
 
 static void time_kernels(es_context* context)
@@ -195,6 +328,22 @@ static void time_kernels(es_context* context)
         double end = es_seconds();
         printf("%-8s face_normals %.3f ms, vertex_normals %.3f ms (100,000 vertices, 200,000 triangles, 1 thread)\n", es_isa_name((es_isa)isa), (middle - begin) * 50, (end - middle) * 50);
     }
+    random_skin skin = make_skin((uint32_t)padded(s.vertices) / 8, 60, 1);
+    for (uint32_t b = 0; b <= skin.weights.blocks; b++) skin.weights.first_row[b] = b * 4 > skin.weights.row_count ? (uint32_t)skin.weights.row_count : b * 4;
+    floats to = new_floats(padded(s.vertices) * 4);
+    for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
+        if (!runs(isa)) continue;
+        const es_sim_kernels* kernels = es_sim_kernel_table((es_isa)isa);
+        es_skin_job job = {&skin.weights, at(skin.palette), {at(s.positions), at(normals)}, {at(to), at(to)}};
+        double begin = es_seconds();
+        for (int i = 0; i < 20; i++) kernels->skin(&job, 0, skin.weights.blocks);
+        double middle = es_seconds();
+        for (int i = 0; i < 20; i++) kernels->morph(at(to), at(s.positions), 0.5f, 0, skin.weights.blocks);
+        double end = es_seconds();
+        printf("%-8s skin %.3f ms (4 joints a vertex, positions and normals), one morph target %.3f ms\n", es_isa_name((es_isa)isa), (middle - begin) * 50, (end - middle) * 50);
+    }
+    free_skin(skin);
+    free(to.memory);
     es_vertex_fans_free(context, &fans);
     free_soup(s);
     free(normals.memory);
@@ -221,6 +370,6 @@ int main(int argc, char** argv)
         time_kernels(context);
         return tear_down(&context);
     }
-    const struct CMUnitTest tests[] = {cmocka_unit_test(check_normals), cmocka_unit_test(normals_scale)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(check_normals), cmocka_unit_test(normals_scale), cmocka_unit_test(check_skin), cmocka_unit_test(check_morph)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
