@@ -263,7 +263,7 @@ typedef struct es_shape_desc {
     es_shape_type type;
     es_vec3 position;         /* of its centre (hull, mesh: of its points' origin) in the body's frame */
     es_quat rotation;         /* all zero: none */
-    float radius;             /* sphere, capsule; box: how much of its half extents, at most the smallest, is rounding; hull: added all around it */
+    float radius;             /* sphere, capsule; box: how much of its half extents is rounding, at most 0.9 of the smallest; hull: added all around it */
     float half_height;        /* capsule: half the distance between the centres of its caps, along its y; 0 … */
     es_vec3 half_extents;     /* box */
     const float* points;      /* hull: 3 floats each, at least four that span a volume; NULL: the vertices of `mesh` */

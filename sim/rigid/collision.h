@@ -92,7 +92,8 @@ uint32_t es_rigid_collide(const es_rigid_shape* a, const es_pose* pose_a, const 
 
 /* Distance between two convex shapes' surfaces, 0 when they overlap, and the nearest points. With a mesh: to the nearest triangle, which has
  * no inside. At most `limit` is looked for: beyond, `limit` is returned and the points are meaningless. */
-float es_rigid_distance(const es_rigid_shape* a, const es_pose* pose_a, const es_rigid_shape* b, const es_pose* pose_b, float limit, es_vec3* on_a, es_vec3* on_b);
+float es_rigid_distance(const es_rigid_shape* a, const es_pose* pose_a, const es_rigid_shape* b, const es_pose* pose_b, float limit,
+    es_vec3* on_a, es_vec3* on_b);
 bool es_rigid_overlap(const es_rigid_shape* a, const es_pose* pose_a, const es_rigid_shape* b, const es_pose* pose_b);
 
 /* ---- motion ----------------------------------------------------------------------------------------------------------- */

@@ -21,12 +21,14 @@ typedef struct es_hull {
     es_vec3 centre;          /* a point inside: the vertices' mean */
 } es_hull;
 
-/* The hull of points (3 floats each, `stride` floats apart), each times `scale` plus nothing. Points nearer than the tolerance, 1e-5 of the
- * largest extent, to what is already there are left out, so that faces are well shaped. Of hulls with more than ES_HULL_VERTICES corners
- * those that reach out farthest are kept. Points that span no volume (all within the tolerance of a plane, line or point) are
- * refused: INVALID_ARGUMENT, the message beginning with `what`. Quickhull: Barber, Dobkin, Huhdanpaa 1996; merging of faces after Gregorius,
- * "Implementing Quickhull", GDC 2014. */
+/* The hull of points (3 floats each, `stride` floats apart), each times `scale`. Points that reach out less than the tolerance, 1e-5 of
+ * the largest extent, are left out, so that faces are well shaped; points may repeat. Of hulls with more than ES_HULL_VERTICES
+ * corners those that reach out farthest are kept. Points that span no volume (all within the tolerance of a plane, line or
+ * point) are refused: INVALID_ARGUMENT, the message beginning with `what`. Quickhull: Barber, Dobkin, Huhdanpaa 1996; merging of
+ * faces after Gregorius, "Implementing Quickhull", GDC 2014. */
 es_result es_hull_build(es_context* context, const float* points, uint32_t count, uint32_t stride, es_vec3 scale, const char* what, es_hull* hull);
+/* Zeroed memory of the right sizes; false after es_fail. */
+bool es_hull_allocate(es_context* context, uint32_t vertices, uint32_t faces, uint32_t half_edges, es_hull* hull);
 /* A box about `centre` with axes turned by `rotation`. */
 es_result es_hull_box(es_context* context, es_vec3 centre, es_quat rotation, es_vec3 half_extents, es_hull* hull);
 /* Moves it: rotation, then position. */
