@@ -147,7 +147,8 @@ static uint32_t collide_deep(const es_core* a, const es_core* b, float margin, e
     uint32_t face = use_b ? face_b.a : face_a.a, count = es_core_face_patch(reference, other, face, use_b, margin, manifold);
     float separation = best - a->radius - b->radius;
     if (best > 0 || (count && holds_depth(manifold, separation, slack - 0.05f * best))) return count;
-    /* an edge's axis would have been a little better, and its points lie beside the face: the deepest corner itself */
+    /* The deepest corner lies beside the face, because an edge's axis is a little better after all. */
+    if (edges.separation >= best) return edge_point(a, b, &edges, manifold);
     es_vec3 n = reference->planes[face].normal;
     uint32_t corner = es_core_support(other, es_v3_neg(n));
     es_vec3 point = es_v3_mad(other->vertices[corner], n, -other->radius - 0.5f * separation);
