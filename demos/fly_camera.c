@@ -41,6 +41,17 @@ static void take_over(fly_camera* fly, es_world* world)
     fly->flying = true;
 }
 
+int fly_camera_place(fly_camera* fly, es_world* world)
+{
+    if (!fly->flying) return es_world_set_active_camera(world, fly->scenes) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
+    float hy = sinf(fly->yaw / 2), wy = cosf(fly->yaw / 2), hp = sinf(fly->pitch / 2), wp = cosf(fly->pitch / 2);
+    es_transform transform = es_identity_transform();
+    transform.translation = fly->position;
+    transform.rotation = (es_quat){wy * hp, hy * wp, -hy * hp, wy * wp}; /* yaw about y after pitch about x */
+    if (es_world_set_node_transform(world, fly->node, &transform) != ES_OK) return DEMO_BAD_INPUT;
+    return es_world_set_active_camera(world, fly->own) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
+}
+
 static float held(const es_window_input* input, int forward, int backward)
 {
     return (float)input->down[forward] - (float)input->down[backward];
@@ -48,6 +59,7 @@ static float held(const es_window_input* input, int forward, int backward)
 
 int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* input, float seconds)
 {
+    if (input->down[ES_KEY_CONTROL]) return DEMO_OK; /* these keys are commands */
     float ahead = held(input, 'W', 'S'), right = held(input, 'D', 'A'), up = held(input, 'E', 'Q');
     float turn = held(input, ES_KEY_LEFT, ES_KEY_RIGHT) * 1.5f * seconds,
           tilt = held(input, ES_KEY_UP, ES_KEY_DOWN) * 1.5f * seconds;
@@ -64,10 +76,5 @@ int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* i
     fly->position.x += step * (-sy * cp * ahead + cy * right);
     fly->position.y += step * (sp * ahead + up);
     fly->position.z += step * (-cy * cp * ahead - sy * right);
-    float hy = sinf(fly->yaw / 2), wy = cosf(fly->yaw / 2), hp = sinf(fly->pitch / 2), wp = cosf(fly->pitch / 2);
-    es_transform transform = es_identity_transform();
-    transform.translation = fly->position;
-    transform.rotation = (es_quat){wy * hp, hy * wp, -hy * hp, wy * wp}; /* yaw about y after pitch about x */
-    if (es_world_set_node_transform(world, fly->node, &transform) != ES_OK) return DEMO_BAD_INPUT;
-    return es_world_set_active_camera(world, fly->own) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
+    return fly_camera_place(fly, world);
 }

@@ -16,6 +16,8 @@ typedef struct fly_camera {
 int fly_camera_init(fly_camera* fly, es_world* world);
 /* Moves with what is held down; the first move leaves the scene's camera where it is and takes over from its pose. */
 int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* input, float seconds);
+/* Puts the world's camera where this one is: after the world was wound back. */
+int fly_camera_place(fly_camera* fly, es_world* world);
 int fly_camera_reset(fly_camera* fly, es_world* world);
 
 #endif

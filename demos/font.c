@@ -1,12 +1,12 @@
 /* A pixel font for text over the picture, drawn here as it looks: 5 × 7 and a row for what hangs below; cells are 6 × 9. */
-#include "overlay.h"
+#include "font.h"
 
 #include <string.h>
 
 typedef struct glyph {
-    char character;
-    char rows[48];
-} glyph; /* eight rows of five, a blank between */
+    uint32_t character;
+    char rows[48]; /* eight rows of five, a blank between */
+} glyph;
 
 static const glyph glyphs[] = {
     {'A', ".###. #...# #...# ##### #...# #...# #...# ....."},
@@ -94,41 +94,65 @@ static const glyph glyphs[] = {
     {'\'', "..#.. ..#.. ..#.. ..... ..... ..... ..... ....."},
     {'"', ".#.#. .#.#. ..... ..... ..... ..... ..... ....."},
     {'|', "..#.. ..#.. ..#.. ..#.. ..#.. ..#.. ..#.. ....."},
+    {'&', ".##.. #..#. #.#.. .#... #.#.# #..#. .##.# ....."},
+    {'@', ".###. #...# #.### #.#.# #.### #.... .###. ....."},
+    {'$', "..#.. .#### #.#.. .###. ..#.# ####. ..#.. ....."},
+    {'^', "..#.. .#.#. #...# ..... ..... ..... ..... ....."},
+    {'~', "..... ..... .#..# #.#.# #..#. ..... ..... ....."},
+    {'`', ".#... ..#.. ..... ..... ..... ..... ..... ....."},
+    {'\\', "#.... #.... .#... ..#.. ...#. ....# ....# ....."},
+    {'{', "...#. ..#.. ..#.. .#... ..#.. ..#.. ...#. ....."},
+    {'}', ".#... ..#.. ..#.. ...#. ..#.. ..#.. .#... ....."},
+    {0xa7, ".###. #.... .##.. #..#. .##.. ...#. ###.. ....."},   /* section */
+    {0xb0, ".##.. #..#. #..#. .##.. ..... ..... ..... ....."},   /* degree */
+    {0xb2, ".##.. #..#. ..#.. .#... ####. ..... ..... ....."},   /* squared */
+    {0xb3, "###.. ...#. .##.. ...#. ###.. ..... ..... ....."},   /* cubed */
+    {0xb7, "..... ..... ..... .##.. .##.. ..... ..... ....."},   /* middle dot */
+    {0xd7, "..... ..... .#.#. ..#.. .#.#. ..... ..... ....."},   /* times */
+    {0xe4, ".#.#. ..... .###. ....# .#### #...# .#### ....."},   /* a, o, u with two dots, e with accents */
+    {0xf6, ".#.#. ..... .###. #...# #...# #...# .###. ....."},
+    {0xfc, ".#.#. ..... #...# #...# #...# #...# .#### ....."},
+    {0xe8, ".#... ..#.. .###. #...# ##### #.... .#### ....."},
+    {0xe9, "...#. ..#.. .###. #...# ##### #.... .#### ....."},
+    {0xb5, "..... ..... #..#. #..#. #..#. #..#. ###.# #...."},   /* micro */
+    {0x2013, "..... ..... ..... ##### ..... ..... ..... ....."}, /* dash */
+    {0x2026, "..... ..... ..... ..... ..... #.#.# #.#.# ....."}, /* ellipsis */
+    {0x2190, "..... ..#.. .#... ##### .#... ..#.. ..... ....."}, /* arrows: left, up, right, down */
+    {0x2191, "..#.. .###. #.#.# ..#.. ..#.. ..#.. ..#.. ....."},
+    {0x2192, "..... ..#.. ...#. ##### ...#. ..#.. ..... ....."},
+    {0x2193, "..#.. ..#.. ..#.. ..#.. #.#.# .###. ..#.. ....."},
+    {0x2264, "...#. ..#.. .#... ..#.. ...#. ..... .###. ....."}, /* at most, at least */
+    {0x2265, ".#... ..#.. ...#. ..#.. .#... ..... .###. ....."},
+    {0x25b6, ".#... .##.. .###. .#### .###. .##.. .#... ....."}, /* play, pause, back, square */
+    {0x23f8, "##.## ##.## ##.## ##.## ##.## ##.## ##.## ....."},
+    {0x25c0, "...#. ..##. .###. ####. .###. ..##. ...#. ....."},
+    {0x25a0, "..... .###. .###. .###. .###. .###. ..... ....."},
 };
 
-static const char* find_glyph(char character)
+static const char missing[] = "##### #...# #...# #...# #...# #...# ##### .....";
+
+const char* font_rows(uint32_t character)
 {
+    if (character == ' ') return NULL;
     for (size_t i = 0; i < sizeof glyphs / sizeof glyphs[0]; i++)
         if (glyphs[i].character == character) return glyphs[i].rows;
-    return NULL;
+    return missing;
 }
 
-static void darken(demo_canvas* canvas, int x0, int y0, int width, int height)
+uint32_t font_next(const char** text)
 {
-    for (int y = y0 < 0 ? 0 : y0; y < y0 + height && y < (int)canvas->height; y++)
-        for (int x = x0 < 0 ? 0 : x0; x < x0 + width && x < (int)canvas->width; x++) {
-            uint32_t* pixel = &canvas->pixels[(size_t)y * canvas->width + (size_t)x];
-            *pixel = *pixel >> 2 & 0x3f3f3f; /* a quarter of the light: white text stays legible on white */
-        }
+    const unsigned char* c = (const unsigned char*)*text;
+    int more = c[0] < 0x80 ? 0 : (c[0] & 0xe0) == 0xc0 ? 1 : (c[0] & 0xf0) == 0xe0 ? 2 : (c[0] & 0xf8) == 0xf0 ? 3 : -1;
+    uint32_t character = more <= 0 ? c[0] : c[0] & (0x3fu >> more);
+    int taken = 1;
+    for (; taken <= more && (c[taken] & 0xc0) == 0x80; taken++) character = character << 6 | (c[taken] & 0x3f);
+    *text += taken;
+    return more < 0 || taken <= more ? 0xfffd : character; /* a damaged character shows as a box */
 }
 
-void demo_draw_text(demo_canvas* canvas, int x, int y, int scale, uint32_t colour, const char* text)
+int font_columns(const char* text)
 {
-    int columns = (int)strlen(text);
-    darken(canvas, x - 2 * scale, y - scale, (columns * 6 + 3) * scale, 9 * scale);
-    for (int i = 0; i < columns; i++) {
-        const char* rows = find_glyph(text[i]);
-        if (!rows) continue;
-        for (int r = 0; r < 8; r++)
-            for (int c = 0; c < 5; c++)
-                if (rows[6 * r + c] == '#') demo_draw_dot(canvas, x + (6 * i + c) * scale, y + r * scale, scale, colour);
-    }
-}
-
-void demo_draw_dot(demo_canvas* canvas, int x0, int y0, int size, uint32_t colour)
-{
-    for (int y = y0; y < y0 + size; y++)
-        for (int x = x0; x < x0 + size; x++)
-            if (x >= 0 && y >= 0 && x < (int)canvas->width && y < (int)canvas->height)
-                canvas->pixels[(size_t)y * canvas->width + (size_t)x] = colour;
+    int columns = 0;
+    for (; *text; columns++) font_next(&text);
+    return columns;
 }

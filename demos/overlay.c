@@ -1,4 +1,4 @@
-/* Overlays of `play`: where the virtual point lights and the shadow maps' points are, what the passes cost, the keys. */
+/* Overlays of `play`: where the virtual point lights and the shadow maps' points are; images of the renderer to look at. */
 #include "overlay.h"
 
 #include <math.h>
@@ -50,8 +50,8 @@ void demo_draw_vpls(demo_canvas* canvas, es_renderer* renderer, const es_raster_
         if (!project(canvas, view, depth, vpls[i].position, &x, &y)) continue;
         const float* flux = vpls[i].flux;
         float most = fmaxf(fmaxf(flux[0], flux[1]), fmaxf(flux[2], 1e-20f));
-        demo_draw_dot(canvas, x - 3, y - 3, 6, 0);
-        demo_draw_dot(canvas, x - 2, y - 2, 4, pack_colour(flux[0] / most, flux[1] / most, flux[2] / most));
+        canvas_dot(canvas, x - 3, y - 3, 6, 0);
+        canvas_dot(canvas, x - 2, y - 2, 4, pack_colour(flux[0] / most, flux[1] / most, flux[2] / most));
     }
     free(vpls);
 }
@@ -66,53 +66,9 @@ void demo_draw_points(demo_canvas* canvas, es_renderer* renderer, const es_raste
     for (size_t i = 0; i < count; i++) {
         int x, y;
         es_vec3 position = {positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]};
-        if (project(canvas, view, depth, position, &x, &y)) demo_draw_dot(canvas, x, y, 2, 0x40ff90);
+        if (project(canvas, view, depth, position, &x, &y)) canvas_dot(canvas, x, y, 2, 0x40ff90);
     }
     free(positions);
-}
-
-static int text_scale(const demo_canvas* canvas) { return canvas->width >= 1600 ? 3 : canvas->width >= 640 ? 2 : 1; }
-
-void demo_draw_timings(demo_canvas* canvas, const es_renderer* renderer, double frame_milliseconds)
-{
-    const es_frame_stats* stats = es_renderer_stats(renderer);
-    int scale = text_scale(canvas), y = 4 * scale;
-    char line[128];
-    snprintf(line, sizeof line, "%-22s %7.2f ms %5.1f /s", "frame", stats->milliseconds,
-        frame_milliseconds > 0 ? 1000 / frame_milliseconds : 0);
-    demo_draw_text(canvas, 4 * scale, y, scale, 0xffffff, line);
-    for (size_t i = 0; i < stats->pass_count; i++) {
-        const es_pass_stats* pass = &stats->passes[i];
-        y += 9 * scale;
-        if (pass->skipped)
-            snprintf(line, sizeof line, "%-22s skipped: %s", pass->name, pass->skipped);
-        else
-            snprintf(line, sizeof line, "%-22s %7.2f ms         ", pass->name, pass->milliseconds);
-        demo_draw_text(canvas, 4 * scale, y, scale, pass->skipped ? 0x909090 : 0xe0e8ff, line);
-    }
-}
-
-void demo_draw_help(demo_canvas* canvas)
-{
-    static const char* const lines[] = {
-        "W A S D  Q E   fly, down, up (Shift: faster)",
-        "drag           look around (arrow keys too)",
-        "R              back to the scene's camera",
-        "Space  N       pause, single step",
-        "L              light: all, direct, indirect",
-        "I  1 ... 9     next image, image by number",
-        "G              method: none, ism, classic",
-        "+  -           exposure",
-        "V  P           show virtual lights, shadow points",
-        "T  H           milliseconds per pass, this help",
-        "Esc            quit",
-    };
-    int scale = text_scale(canvas), count = (int)(sizeof lines / sizeof lines[0]);
-    for (int i = 0; i < count; i++) {
-        char line[64];
-        snprintf(line, sizeof line, "%-50s", lines[i]);
-        demo_draw_text(canvas, 4 * scale, (int)canvas->height - (count - i) * 9 * scale - 3 * scale, scale, 0xffffff, line);
-    }
 }
 
 static float encode_srgb(float x)

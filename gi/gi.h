@@ -111,6 +111,10 @@ ES_API es_result es_renderer_image(es_renderer* renderer, const char* name, es_i
 /* The displayed image as 0x00RRGGBB, width × height words, top row first; valid until the next call on the renderer. */
 ES_API const uint32_t* es_renderer_display(es_renderer* renderer, uint32_t* width, uint32_t* height);
 
+/* Radiance that another renderer made, a reference say, as these settings' exposure and tone map display it: 0x00RRGGBB, width × height words. Of an
+ * image "radiance" it makes the displayed picture. INVALID_ARGUMENT with fewer than three channels; R, G and B are the first three. */
+ES_API es_result es_tone_map_image(es_context* context, const es_renderer_settings* settings, const es_image* radiance, uint32_t* xrgb);
+
 typedef struct es_pass_stats {
     const char* name;
     double milliseconds;

@@ -194,18 +194,27 @@ typedef struct es_setting {
 typedef struct es_window es_window;
 typedef struct es_window_desc { const char* title; uint32_t width, height; } es_window_desc;
 
-/* Keys are ASCII upper case or one of these. */
-enum { ES_KEY_ESCAPE = 256, ES_KEY_LEFT, ES_KEY_RIGHT, ES_KEY_UP, ES_KEY_DOWN, ES_KEY_SPACE = 32, ES_KEY_TAB = 9, ES_KEY_SHIFT = 270, ES_KEY_CONTROL, ES_KEY_F1 = 290 };
+/* Keys are ASCII upper case or one of these; they are named by their place on a US keyboard. */
+enum {
+    ES_KEY_BACKSPACE = 8, ES_KEY_TAB = 9, ES_KEY_ENTER = 13, ES_KEY_SPACE = 32, ES_KEY_DELETE = 127,
+    ES_KEY_ESCAPE = 256, ES_KEY_LEFT, ES_KEY_RIGHT, ES_KEY_UP, ES_KEY_DOWN, ES_KEY_PAGE_UP, ES_KEY_PAGE_DOWN, ES_KEY_HOME, ES_KEY_END,
+    ES_KEY_SHIFT = 270, ES_KEY_CONTROL, ES_KEY_ALT, ES_KEY_F1 = 290
+};
+enum { ES_WINDOW_KEYS = 512, ES_WINDOW_TEXT = 32 };
 
 typedef struct es_window_input {
-    bool down[512];              /* held now */
-    bool pressed[512];           /* went down since the last poll */
-    float mouse_x, mouse_y;      /* pixels of the window, origin top left */
-    float mouse_dx, mouse_dy;    /* since the last poll */
+    bool down[ES_WINDOW_KEYS];       /* held now */
+    bool pressed[ES_WINDOW_KEYS];    /* went down since the last poll */
+    bool repeated[ES_WINDOW_KEYS];   /* went down since the last poll, or was repeated because it is held */
+    uint32_t text[ES_WINDOW_TEXT];   /* characters typed since the last poll, Unicode, as the keyboard's layout has them */
+    uint32_t text_count;             /* further ones are lost */
+    float mouse_x, mouse_y;          /* pixels of the window, origin top left */
+    float mouse_dx, mouse_dy;        /* since the last poll */
     float scroll;
-    bool mouse_down[3], mouse_pressed[3];  /* left, right, middle */
-    bool close;                  /* the user asked to close the window */
-    uint32_t width, height;      /* of the drawable */
+    bool mouse_down[3], mouse_pressed[3], mouse_released[3];  /* left, right, middle */
+    float press_x[3], press_y[3];    /* where the pointer was when the button went down: the poll may come late */
+    bool close;                      /* the user asked to close the window */
+    uint32_t width, height;          /* of the drawable */
 } es_window_input;
 
 /* NO_DISPLAY when there is none, NOT_BUILT without GLFW. Presents through X11 shared memory where it can, else OpenGL. */
@@ -214,6 +223,7 @@ ES_API void es_window_destroy(es_window* window);
 ES_API void es_window_poll(es_window* window, es_window_input* input);
 /* xrgb: width × height words 0x00RRGGBB, top row first; scaled (nearest) to the window when sizes differ. */
 ES_API void es_window_present(es_window* window, const uint32_t* xrgb, uint32_t width, uint32_t height);
+ES_API void es_window_set_title(es_window* window, const char* title);
 ES_API const char* es_window_backend(const es_window* window);  /* "x11-shm", "x11" (no shared memory with the server) or "opengl" */
 
 #ifdef __cplusplus

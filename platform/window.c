@@ -51,6 +51,7 @@ struct es_window {
     bool owns_glfw;
     const char* backend;
     es_window_input input;
+    float cursor_x, cursor_y; /* as of the last event taken */
     /* X11 */
     Display* display;
     Window window;
@@ -81,6 +82,16 @@ static int key_of(int key)
     case GLFW_KEY_UP: return ES_KEY_UP;
     case GLFW_KEY_DOWN: return ES_KEY_DOWN;
     case GLFW_KEY_TAB: return ES_KEY_TAB;
+    case GLFW_KEY_ENTER: case GLFW_KEY_KP_ENTER: return ES_KEY_ENTER;
+    case GLFW_KEY_BACKSPACE: return ES_KEY_BACKSPACE;
+    case GLFW_KEY_DELETE: return ES_KEY_DELETE;
+    case GLFW_KEY_PAGE_UP: return ES_KEY_PAGE_UP;
+    case GLFW_KEY_PAGE_DOWN: return ES_KEY_PAGE_DOWN;
+    case GLFW_KEY_HOME: return ES_KEY_HOME;
+    case GLFW_KEY_END: return ES_KEY_END;
+    case GLFW_KEY_KP_ADD: return '+';
+    case GLFW_KEY_KP_SUBTRACT: return '-';
+    case GLFW_KEY_LEFT_ALT: case GLFW_KEY_RIGHT_ALT: return ES_KEY_ALT;
     case GLFW_KEY_LEFT_SHIFT: case GLFW_KEY_RIGHT_SHIFT: return ES_KEY_SHIFT;
     case GLFW_KEY_LEFT_CONTROL: case GLFW_KEY_RIGHT_CONTROL: return ES_KEY_CONTROL;
     default: return -1;
@@ -91,9 +102,25 @@ static void on_key(GLFWwindow* glfw, int key, int scan_code, int action, int mod
 {
     es_window* window = glfwGetWindowUserPointer(glfw);
     int index = key_of(key);
-    if (index < 0 || action == GLFW_REPEAT) return;
+    if (index < 0) return;
+    if (action != GLFW_RELEASE) window->input.repeated[index] = true;
+    if (action == GLFW_REPEAT) return;
     window->input.down[index] = action == GLFW_PRESS;
     if (action == GLFW_PRESS) window->input.pressed[index] = true;
+}
+
+static void on_character(GLFWwindow* glfw, unsigned character)
+{
+    es_window* window = glfwGetWindowUserPointer(glfw);
+    if (window->input.text_count < ES_WINDOW_TEXT) window->input.text[window->input.text_count++] = character;
+}
+
+/* Also called while events are taken in turn, so that a button's press knows where the pointer was then. */
+static void on_cursor(GLFWwindow* glfw, double x, double y)
+{
+    es_window* window = glfwGetWindowUserPointer(glfw);
+    window->cursor_x = (float)x;
+    window->cursor_y = (float)y;
 }
 
 static void on_button(GLFWwindow* glfw, int button, int action, int modifiers)
@@ -101,7 +128,13 @@ static void on_button(GLFWwindow* glfw, int button, int action, int modifiers)
     es_window* window = glfwGetWindowUserPointer(glfw);
     if (button < 0 || button > 2) return;  /* GLFW counts left, right, middle too */
     window->input.mouse_down[button] = action == GLFW_PRESS;
-    if (action == GLFW_PRESS) window->input.mouse_pressed[button] = true;
+    if (action == GLFW_PRESS) {
+        window->input.mouse_pressed[button] = true;
+        window->input.press_x[button] = window->cursor_x;
+        window->input.press_y[button] = window->cursor_y;
+    } else {
+        window->input.mouse_released[button] = true;
+    }
 }
 
 static void on_scroll(GLFWwindow* glfw, double x, double y)
@@ -118,7 +151,10 @@ void es_window_poll(es_window* window, es_window_input* input)
     }
     es_window_input* state = &window->input;
     memset(state->pressed, 0, sizeof state->pressed);
+    memset(state->repeated, 0, sizeof state->repeated);
     memset(state->mouse_pressed, 0, sizeof state->mouse_pressed);
+    memset(state->mouse_released, 0, sizeof state->mouse_released);
+    state->text_count = 0;
     state->scroll = 0;
     glfwPollEvents();
     double x, y;
@@ -403,10 +439,14 @@ es_result es_window_create(es_context* context, const es_window_desc* desc, es_w
     glfwSetKeyCallback(window->glfw, on_key);
     glfwSetMouseButtonCallback(window->glfw, on_button);
     glfwSetScrollCallback(window->glfw, on_scroll);
+    glfwSetCharCallback(window->glfw, on_character);
+    glfwSetCursorPosCallback(window->glfw, on_cursor);
     double x, y;
     glfwGetCursorPos(window->glfw, &x, &y);
     window->input.mouse_x = (float)x;
     window->input.mouse_y = (float)y;
+    window->cursor_x = (float)x;
+    window->cursor_y = (float)y;
     es_context_count_object(context, 1);
     *out = window;
     return ES_OK;
@@ -435,6 +475,11 @@ void es_window_present(es_window* window, const uint32_t* xrgb, uint32_t width, 
     else present_opengl(window, xrgb, width, height);
 }
 
+void es_window_set_title(es_window* window, const char* title)
+{
+    if (window && title) glfwSetWindowTitle(window->glfw, title);
+}
+
 const char* es_window_backend(const es_window* window) { return window ? window->backend : ""; }
 
 #else
@@ -452,6 +497,7 @@ void es_window_poll(es_window* window, es_window_input* input)
     if (input) *input = (es_window_input){0};
 }
 void es_window_present(es_window* window, const uint32_t* xrgb, uint32_t width, uint32_t height) {}
+void es_window_set_title(es_window* window, const char* title) {}
 const char* es_window_backend(const es_window* window) { return ""; }
 
 #endif

@@ -1,0 +1,146 @@
+/* Graphs of the last frames: milliseconds of each pass, flicker, light, and the bodies' energy. */
+#include "font.h"
+#include "player.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static ui_series* series_of_pass(player_graphs* g, const char* name)
+{
+    for (size_t i = 0; i < g->pass_count; i++)
+        if (!strncmp(g->passes[i].name, name, sizeof g->passes[i].name - 1)) return &g->passes[i].milliseconds;
+    if (g->pass_count == PLAYER_MAX_SERIES) return NULL;
+    snprintf(g->passes[g->pass_count].name, sizeof g->passes[g->pass_count].name, "%s", name);
+    return &g->passes[g->pass_count++].milliseconds;
+}
+
+/* ---- flicker ---------------------------------------------------------------------------------------------------------------------- */
+
+enum { GRID_STEP = 4 }; /* pixels between the samples of the picture, each way */
+
+static float luminance(uint32_t xrgb)
+{
+    return 0.2126f * (float)(xrgb >> 16 & 255) + 0.7152f * (float)(xrgb >> 8 & 255) + 0.0722f * (float)(xrgb & 255);
+}
+
+/* What of the picture's change is not steady: the root mean square over a grid of pixels of L(t-1) - (L(t) + L(t-2)) / 2, the displayed
+ * luminance, over its mean. A light that fades or a body that slides past leaves little of it, what jumps to and fro all. */
+static float measure_flicker(player* p)
+{
+    player_graphs* g = &p->graphs;
+    uint32_t width, height;
+    const uint32_t* pixels = es_renderer_display(p->session.renderer, &width, &height);
+    uint32_t columns = width / GRID_STEP, rows = height / GRID_STEP;
+    size_t samples = (size_t)columns * rows;
+    if (!samples) return NAN;
+    if (columns != g->grid_width || rows != g->grid_height) {
+        float* grown = realloc(g->luminance, 2 * samples * sizeof *grown);
+        if (!grown) return NAN;
+        g->luminance = grown;
+        g->grid_width = columns;
+        g->grid_height = rows;
+        g->grids = 0;
+    }
+    double sum = 0, mean = 0;
+    float *last = g->luminance, *before = g->luminance + samples;
+    for (uint32_t y = 0; y < rows; y++)
+        for (uint32_t x = 0; x < columns; x++) {
+            size_t i = (size_t)y * columns + x;
+            float now = luminance(pixels[(size_t)y * GRID_STEP * width + (size_t)x * GRID_STEP]);
+            float jump = last[i] - 0.5f * (now + before[i]);
+            sum += (double)(jump * jump);
+            mean += (double)last[i];
+            before[i] = last[i];
+            last[i] = now;
+        }
+    if (g->grids < 2) {
+        g->grids++;
+        return NAN;
+    }
+    ui_series_add(&g->brightness, (float)(mean / (double)samples / 255));
+    return mean > 0 ? (float)(sqrt(sum / (double)samples) / (mean / (double)samples)) : 0;
+}
+
+/* ---- all of a frame ------------------------------------------------------------------------------------------------------------------ */
+
+void player_graphs_add(player* p)
+{
+    player_graphs* g = &p->graphs;
+    const es_frame_stats* stats = es_renderer_stats(p->session.renderer);
+    ui_series_add(&g->frame, (float)stats->milliseconds);
+    for (size_t i = 0; i < stats->pass_count; i++) {
+        ui_series* series = series_of_pass(g, stats->passes[i].name);
+        if (series) ui_series_add(series, stats->passes[i].skipped ? 0 : (float)stats->passes[i].milliseconds);
+    }
+    if (p->show_graphs) ui_series_add(&g->flicker, measure_flicker(p));
+    else g->grids = 0;
+}
+
+/* ---- panel ------------------------------------------------------------------------------------------------------------------------------ */
+
+static const uint32_t colours[] = {0x66b2ff, 0xffb454, 0x7fd962, 0xf07178, 0xd2a6ff, 0x5ccfe6, 0xffd173, 0xc0c8d0};
+enum { COLOURS = sizeof colours / sizeof colours[0] };
+
+/* A plot with its upper edge's value and its newest. */
+static void plot(player* p, int height, const char* title, const char* format, const ui_series* series, uint32_t colour)
+{
+    ui* u = &p->ui;
+    char line[96], number[32], edge[32];
+    float top = ui_plot_top(ui_series_largest(series));
+    snprintf(number, sizeof number, format, (double)ui_series_at(series, 0));
+    snprintf(edge, sizeof edge, format, (double)top);
+    snprintf(line, sizeof line, "%s %s, edge %s", title, number, edge);
+    ui_label(u, 0, colour, line);
+    ui_next_row(u);
+    canvas_rect rect = {u->left, u->y, u->right - u->left, height};
+    canvas_fill(u->canvas, rect, 0x05070a);
+    ui_plot(u->canvas, rect, series, top, u->scale, colour);
+    u->y += height + 2 * u->scale;
+}
+
+/* The passes that took the most in the mean, and their curves over each other. */
+static void plot_passes(player* p, int height)
+{
+    enum { SHOWN = 8 };
+    ui* u = &p->ui;
+    player_graphs* g = &p->graphs;
+    size_t order[PLAYER_MAX_SERIES], count = g->pass_count;
+    for (size_t i = 0; i < count; i++) {
+        size_t at = i;
+        float mean = ui_series_mean(&g->passes[i].milliseconds);
+        for (; at > 0 && ui_series_mean(&g->passes[order[at - 1]].milliseconds) < mean; at--) order[at] = order[at - 1];
+        order[at] = i;
+    }
+    if (count > SHOWN) count = SHOWN;
+    float largest = 0;
+    for (size_t i = 0; i < count; i++) largest = fmaxf(largest, ui_series_largest(&g->passes[order[i]].milliseconds));
+    float top = ui_plot_top(largest);
+    canvas_rect rect = {u->left, u->y, u->right - u->left, height};
+    canvas_fill(u->canvas, rect, 0x05070a);
+    for (size_t i = count; i-- > 0;) ui_plot(u->canvas, rect, &g->passes[order[i]].milliseconds, top, u->scale, colours[i % COLOURS]);
+    char line[96];
+    snprintf(line, sizeof line, "%g ms", (double)top);
+    canvas_text(u->canvas, rect.x + 2 * u->scale, rect.y + 2 * u->scale, u->scale, UI_DIM, line, 16);
+    u->y += height + 2 * u->scale;
+    for (size_t i = 0; i < count; i++) {
+        const ui_series* series = &g->passes[order[i]].milliseconds;
+        snprintf(line, sizeof line, "%-24.24s %7.2f  mean %6.2f", g->passes[order[i]].name, (double)ui_series_at(series, 0), (double)ui_series_mean(series));
+        canvas_text(u->canvas, u->left, u->y, u->scale, colours[i % COLOURS], line, 60);
+        u->y += FONT_HEIGHT * u->scale;
+    }
+}
+
+void player_graphs_panel(player* p, canvas_rect rect)
+{
+    ui* u = &p->ui;
+    player_graphs* g = &p->graphs;
+    if (!ui_panel_begin(u, "graphs", rect, "Graphs")) p->show_graphs = false;
+    int text = 3 * (u->row + 2 * u->scale) + 8 * FONT_HEIGHT * u->scale, left = rect.y + rect.height - u->y - text - 6 * u->scale;
+    int height = left / 5 > 12 * u->scale ? left / 5 : 12 * u->scale;
+    plot(p, height, "frame", "%.2f ms", &g->frame, UI_TEXT);
+    plot(p, height, "flicker", "%.4f", &g->flicker, colours[3]);
+    plot(p, height, "brightness", "%.3f", &g->brightness, colours[1]);
+    plot_passes(p, 2 * height);
+    ui_panel_end(u);
+}
