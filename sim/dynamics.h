@@ -9,4 +9,10 @@ bool es_dynamics_present(const es_world* world);
 /* The share of the last fixed step that has passed at the world's time, 0 … 1; 1 at its end and without world.interpolate. */
 float es_step_phase(const es_world* world);
 
+/* Rigid bodies (sim/rigid/step.c). A step fails only for want of memory, and then may be made again. */
+void es_rigid_begin_frame(es_world* world);  /* forgets the events of the frame before */
+es_result es_rigid_step(es_world* world, float h, uint32_t substeps);
+/* Puts the nodes of dynamic bodies between the last two steps: 0 … 1, 1 the last. */
+void es_rigid_pose(es_world* world, float alpha);
+
 #endif

@@ -4,9 +4,20 @@
 
 #include "platform/platform.h"
 #include "sim/deform.h"
+#include "sim/rigid/solver.h"
 
 /* X(name, arguments) */
 #define ES_SIM_KERNELS(X)                                                                                        \
+    /* rigid bodies: records [begin, end), both multiples of 8 */                                                \
+    X(rigid_accelerate, (const es_solver_job* job, uint32_t begin, uint32_t end))                                \
+    X(rigid_move, (const es_solver_job* job, uint32_t begin, uint32_t end))                                      \
+    /* contacts [begin, end), of one colour */                                                                   \
+    X(contacts_prepare, (const es_solver_job* job, uint32_t begin, uint32_t end))                                \
+    X(contacts_warm_start, (const es_solver_job* job, uint32_t begin, uint32_t end))                             \
+    X(contacts_solve, (const es_solver_job* job, uint32_t begin, uint32_t end))                                  \
+    X(contacts_relax, (const es_solver_job* job, uint32_t begin, uint32_t end))                                  \
+    X(contacts_bounce, (const es_solver_job* job, uint32_t begin, uint32_t end))                                 \
+    X(contacts_store, (const es_solver_job* job, uint32_t begin, uint32_t end))                                  \
     /* Cross products of triangles [begin, end) from vertices times `scale`, 4 floats each; begin a multiple of 8, and zeros are   \
      * written up to the next one after end. indices: 3 per triangle */                                          \
     X(face_normals, (const float* positions, const uint32_t* indices, uint32_t begin, uint32_t end, float scale, float* faces)) \

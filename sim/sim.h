@@ -313,6 +313,140 @@ ES_API es_result es_world_set_mover(es_world* world, es_mover mover, const es_mo
 ES_API es_result es_world_get_mover(const es_world* world, es_mover mover, es_mover_desc* desc);
 ES_API es_result es_world_destroy_mover(es_world* world, es_mover mover);
 
+/* ---- rigid bodies ----------------------------------------------------------------------------------------------------------------------------- */
+
+/* Bodies move in fixed steps of settings.step seconds, each solved in settings.substeps substeps as soft constraints: Catto, "Solver2D"
+ * (2024), section Soft Step, in three dimensions. Lengths in metres, masses in kilograms; made for bodies of 0.01 … 100 m and
+ * up to 500 m/s. Centres are kept in double, so a pile far from zero behaves like one at zero.
+ *
+ * What is survived: any dt that es_world_step takes; masses 1:1000 apart (a heavy body on a light one sinks in by some of the contact's softness);
+ * bodies that begin deep inside each other (pushed apart at 3 m/s at most). What is refused, with a message: numbers that are not finite,
+ * negative mass or density, shapes without volume where mass is asked of them. Speeds are limited to 1000 m/s, and to a turn by half a
+ * circle per step. */
+
+typedef struct es_body { uint32_t id; } es_body;
+typedef enum es_body_type { ES_BODY_STATIC, ES_BODY_KINEMATIC, ES_BODY_DYNAMIC } es_body_type;
+typedef struct es_body_desc {
+    const char* name;
+    es_body_type type;
+    es_node node;             /* its axes are the body's. A dynamic body drives it; a kinematic one follows it with the speed that takes it
+                               * there within a step; a static one jumps when it is set anew. Scale is not the body's: shapes have their
+                               * own. A dynamic body's node must not be below a scaled one. Null: the body starts at `position` */
+    double position[3];       /* without a node */
+    es_quat rotation;         /* without a node; all zero counts as the identity */
+    const es_shape_desc* shapes;
+    uint32_t shape_count;     /* 0 … 4096; a dynamic body without shapes needs a mass, and turns as a sphere of radius 0.5 would */
+    float mass;               /* kg, 0: by density; the inertia scales with it. 1e-6 … 1e9 */
+    es_vec3 velocity, angular_velocity; /* of the centre of mass, m/s; rad/s */
+    float linear_damping, angular_damping; /* 1/s: speed falls by v / (1 + damping t) */
+    float gravity_scale;      /* 1 by es_default_body_desc */
+    bool no_sleep;            /* never falls asleep, nor does what touches it */
+    bool asleep;              /* begins asleep */
+    bool continuous;          /* swept against dynamic bodies too; against static ones every fast body is */
+} es_body_desc;
+ES_API es_body_desc es_default_body_desc(void); /* dynamic, gravity_scale 1 */
+ES_API es_result es_world_add_body(es_world* world, const es_body_desc* desc, es_body* body);
+/* What touched it wakes up. WRONG_STATE while a joint refers to it. */
+ES_API es_result es_world_destroy_body(es_world* world, es_body body);
+
+typedef struct es_body_state {
+    es_body_type type;
+    es_node node;
+    double position[3];       /* of the body's own axes, at the last fixed step; nodes show it between the last two */
+    es_quat rotation;
+    double centre[3];         /* of mass */
+    es_vec3 local_centre;     /* the same in the body's axes */
+    es_vec3 velocity, angular_velocity; /* of the centre of mass */
+    float mass;               /* 0: static and kinematic */
+    float linear_damping, angular_damping, gravity_scale;
+    uint32_t shape_count;
+    bool no_sleep, asleep, continuous;
+} es_body_state;
+ES_API es_result es_world_get_body(const es_world* world, es_body body, es_body_state* state);
+/* Sets it down elsewhere, without passing what is between; wakes it and what it touched. */
+ES_API es_result es_world_set_body_pose(es_world* world, es_body body, const double position[3], es_quat rotation);
+/* These four wake it; on static bodies they are refused, forces and impulses on kinematic ones do nothing. `at`: world coordinates, NULL: the
+ * centre of mass. A force acts during the next fixed step only. */
+ES_API es_result es_world_set_body_velocity(es_world* world, es_body body, es_vec3 velocity, es_vec3 angular_velocity);
+ES_API es_result es_world_apply_impulse(es_world* world, es_body body, es_vec3 impulse, const double at[3]);
+ES_API es_result es_world_apply_force(es_world* world, es_body body, es_vec3 force, const double at[3]);
+ES_API es_result es_world_wake_body(es_world* world, es_body body);
+
+/* What began and ended to touch during the last es_world_step, in the order of its fixed steps, within one by bodies and shapes. A pair
+ * that ends because one of them is destroyed is reported as left, with a stale handle. Valid until the next step or change of bodies. */
+typedef struct es_contact_event {
+    es_body a, b;
+    uint32_t shape_a, shape_b; /* indices into the descs' shapes */
+    bool enter;               /* else leave; then the normal, point and speed are zero */
+    bool sensor;              /* one of the shapes is */
+    es_vec3 normal;           /* from a to b */
+    double point[3];
+    float speed;              /* at which they approached, m/s */
+} es_contact_event;
+ES_API const es_contact_event* es_world_contact_events(const es_world* world, size_t* count);
+
+/* ---- joints between bodies --------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct es_joint { uint32_t id; } es_joint;
+typedef enum es_joint_type {
+    ES_JOINT_BALL,            /* the frames' origins stay together */
+    ES_JOINT_HINGE,           /* and so do their z axes, about which b turns: 0 where the x axes agree */
+    ES_JOINT_DISTANCE,        /* the origins stay `length` apart, by a rod, a spring, or within limits */
+    ES_JOINT_FIXED,           /* the frames stay together */
+    ES_JOINT_MOTOR            /* the frames are pulled together by a spring, or b is driven relative to a, with limited force and torque */
+} es_joint_type;
+
+typedef struct es_joint_desc {
+    const char* name;
+    es_joint_type type;
+    es_body a, b;             /* different; one may be null: the world's own axes */
+    es_vec3 position_a, position_b; /* the joint's frame in each body's axes */
+    es_quat rotation_a, rotation_b; /* all zero: none */
+    bool collide_connected;   /* a and b may touch */
+    bool limit;               /* HINGE: angle in [lower, upper], within -3.1 … 3.1; DISTANCE: length in [lower, upper] */
+    float lower, upper;
+    bool motor;               /* HINGE: turns at `speed` (b relative to a, rad/s) as far as `max_torque` (N m) allows; DISTANCE: grows at `speed` m/s with `max_force` */
+    float speed;
+    float length;             /* DISTANCE, m; negative: as they are when the joint is made */
+    float hertz, damping_ratio; /* softness: cycles per second of the spring, 1 is critical. hertz 0: rigid; HINGE: about its axis, to angle 0;
+                                 * MOTOR: 0 is no spring, the velocities below drive */
+    es_vec3 velocity, angular_velocity; /* MOTOR: of b relative to a, in a's frame */
+    float max_force, max_torque; /* N, N m, 0 … 1e12 */
+    float break_force, break_torque; /* above them the joint stops to hold, once and for all; 0: never */
+} es_joint_desc;
+ES_API es_joint_desc es_default_joint_desc(void); /* a ball joint, length -1 */
+/* Sets both frames so that they lie at `point` (world coordinates), turned by `rotation`, as the bodies stand now. */
+ES_API es_result es_world_place_joint(const es_world* world, es_joint_desc* desc, const double point[3], es_quat rotation);
+/* Wakes both. INVALID_ARGUMENT when no side can move or a number is out of range. */
+ES_API es_result es_world_add_joint(es_world* world, const es_joint_desc* desc, es_joint* joint);
+/* Everything but name, type, a, b and collide_connected may change. */
+ES_API es_result es_world_set_joint(es_world* world, es_joint joint, const es_joint_desc* desc);
+ES_API es_result es_world_get_joint(const es_world* world, es_joint joint, es_joint_desc* desc);
+/* What it does now: the force and torque on b in the last step (N, N m), the hinge's angle or the length, and whether
+ * it broke. */
+typedef struct es_joint_state { es_vec3 force, torque; float value; bool broken; } es_joint_state;
+ES_API es_result es_world_get_joint_state(const es_world* world, es_joint joint, es_joint_state* state);
+ES_API es_result es_world_destroy_joint(es_world* world, es_joint joint);
+
+/* ---- hands: what a player holds --------------------------------------------------------------------------------------------------------------------- */
+
+/* A hand pulls a point of a body to a place by a critically damped spring of 6 Hz. Hands belong to the world's state, not to its content: saving and
+ * rewinding work while something is held. */
+enum { ES_HANDS = 4 };
+typedef struct es_hand_state {
+    es_body body;             /* held, or null */
+    uint32_t soft, vertex;    /* a soft body's handle and which of its vertices, or 0 */
+    es_vec3 local_point;      /* in the body's axes */
+    double target[3];
+    float max_force;          /* N */
+    es_vec3 impulse, turn;    /* of the last substep, N s and N m s */
+} es_hand_state;
+/* What the hand held before is let go. max_force 0: 1000 times the body's mass. */
+ES_API es_result es_world_grab_body(es_world* world, uint32_t hand, es_body body, es_vec3 local_point, const double target[3], float max_force);
+ES_API es_result es_world_move_hand(es_world* world, uint32_t hand, const double target[3]);
+ES_API es_result es_world_release(es_world* world, uint32_t hand);
+ES_API es_result es_world_get_hand(const es_world* world, uint32_t hand, es_hand_state* state);
+
 /* ---- destroying and enumerating ----------------------------------------------------------------------------------------------------------------- */
 
 /* Refused (WRONG_STATE) while something that exists refers to the object. */
@@ -338,12 +472,17 @@ typedef enum es_object_kind {
     ES_OBJECT_CLIP,
     ES_OBJECT_MOVER,
     ES_OBJECT_SKIN,
+    ES_OBJECT_BODY,
+    ES_OBJECT_JOINT,
     ES_OBJECT_KINDS
 } es_object_kind;
 /* Handles of all objects of a kind in creation-slot order; *count is the capacity in, the number of objects out; ids NULL asks for it. */
 ES_API es_result es_world_enumerate(const es_world* world, es_object_kind kind, uint32_t* ids, size_t* count);
 /* "" when unnamed; NULL for a stale handle. */
 ES_API const char* es_world_name(const es_world* world, es_object_kind kind, uint32_t id);
+/* Of the object's part of the saved state: where two worlds differ, this says in which object. Textures and materials have none. 0 for a stale
+ * handle. */
+ES_API uint64_t es_world_object_hash(const es_world* world, es_object_kind kind, uint32_t id);
 
 /* ---- what the light reads ---------------------------------------------------------------------------------------------------------------------------- */
 

@@ -3,54 +3,9 @@
  * One function visits every piece of state in slot order; it counts, writes, hashes, checks or applies, so the five can
  * never disagree about the layout. A saved state carries a signature of the world's content (which objects exist, how
  * large their meshes are) and a hash of itself: another world's or a damaged buffer is refused before anything is touched. */
-#include "sim/world.h"
+#include "sim/state_io.h"
 
-#include <string.h>
-
-#include "platform/random.h"
-
-typedef enum state_mode { COUNT, WRITE, HASH, CHECK, APPLY } state_mode;
-typedef struct state_io {
-    state_mode mode;
-    char* bytes;        /* WRITE, CHECK, APPLY */
-    size_t at, size;    /* size: CHECK, APPLY */
-    uint64_t hash;
-    bool good;
-    bool no_memory;     /* and the context has said so */
-} state_io;
-
-static bool reading(const state_io* io) { return io->mode >= CHECK; }
-
-static void transfer(state_io* io, void* data, size_t size)
-{
-    if (reading(io) && (!io->good || size > io->size - io->at)) {
-        io->good = false;
-        return;
-    }
-    if (io->mode == WRITE) memcpy(io->bytes + io->at, data, size);
-    else if (io->mode == HASH) io->hash = es_hash_bytes(io->hash, data, size);
-    else if (reading(io)) memcpy(data, io->bytes + io->at, size);
-    io->at += size;
-}
-
-static void visit_u32(state_io* io, uint32_t* value) { transfer(io, value, sizeof *value); }
-static void visit_floats(state_io* io, float* values, size_t count) { transfer(io, values, count * sizeof *values); }
-
-/* Within what a float holds: matrices are rounded from it. */
-static void visit_position(state_io* io, double position[3])
-{
-    transfer(io, position, 3 * sizeof *position);
-    if (!reading(io)) return;
-    for (int k = 0; k < 3; k++) io->good &= position[k] >= -3e38 && position[k] <= 3e38;
-}
-
-static void visit_flag(state_io* io, bool* flag)
-{
-    uint32_t word = *flag;
-    visit_u32(io, &word);
-    if (reading(io)) io->good &= word <= 1;
-    *flag = word == 1;
-}
+#include "sim/rigid/rigid_state.h"
 
 static void visit_node(es_world* world, state_io* io, es_node_object* node)
 {
@@ -273,6 +228,22 @@ static void visit_environment(es_world* world, state_io* io)
     es_world_set_environment(world, &(es_environment_desc){.image = image, .radiance = {radiance[0], radiance[1], radiance[2]}, .rotation = rotation});
 }
 
+static void visit_object(es_world* world, state_io* io, es_object_kind kind, void* object)
+{
+    switch (kind) {
+    case ES_OBJECT_NODE: visit_node(world, io, object); break;
+    case ES_OBJECT_INSTANCE: visit_instance(world, io, object); break;
+    case ES_OBJECT_CAMERA: visit_camera(world, io, object); break;
+    case ES_OBJECT_LIGHT: visit_light(world, io, object); break;
+    case ES_OBJECT_MOVER: visit_mover(world, io, object); break;
+    case ES_OBJECT_CLIP: visit_clip(io, object); break;
+    case ES_OBJECT_MESH: visit_mesh(world, io, object); break;
+    case ES_OBJECT_BODY: es_visit_body(world, io, object); break;
+    case ES_OBJECT_JOINT: es_visit_joint(world, io, object); break;
+    default: break; /* assets: nothing of them moves */
+    }
+}
+
 static void visit_world(es_world* world, state_io* io)
 {
     double time = world->time, fixed_base = world->fixed_base;
@@ -302,21 +273,13 @@ static void visit_world(es_world* world, state_io* io)
         world->camera_dirty = world->nodes_moving = world->list_dirty = true;
     }
     visit_environment(world, io);
-    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_MOVER, ES_OBJECT_CLIP, ES_OBJECT_MESH};
+    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_MOVER, ES_OBJECT_CLIP, ES_OBJECT_MESH, ES_OBJECT_BODY, ES_OBJECT_JOINT};
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++)
         for (uint32_t slot = 0; slot < world->slots[kinds[k]].slot_count && (io->good || !reading(io)); slot++) {
             void* object = es_slots_at(&world->slots[kinds[k]], slot);
-            if (!object) continue;
-            switch (kinds[k]) {
-            case ES_OBJECT_NODE: visit_node(world, io, object); break;
-            case ES_OBJECT_INSTANCE: visit_instance(world, io, object); break;
-            case ES_OBJECT_CAMERA: visit_camera(world, io, object); break;
-            case ES_OBJECT_LIGHT: visit_light(world, io, object); break;
-            case ES_OBJECT_MOVER: visit_mover(world, io, object); break;
-            case ES_OBJECT_CLIP: visit_clip(io, object); break;
-            default: visit_mesh(world, io, object); break;
-            }
+            if (object) visit_object(world, io, kinds[k], object);
         }
+    es_visit_rigid(world, io);
 }
 
 static uint64_t content_signature(const es_world* world)
@@ -338,6 +301,8 @@ static uint64_t content_signature(const es_world* world)
                 words[1] = ((const es_skin_object*)object)->mesh.id;
                 words[2] = ((const es_skin_object*)object)->joint_count;
             }
+            if (object && kind == ES_OBJECT_BODY) es_body_signature((const es_body_object*)object, words + 1);
+            if (object && kind == ES_OBJECT_JOINT) es_joint_signature((const es_joint_object*)object, words + 1);
             hash = es_hash_bytes(hash, words, sizeof words);
         }
         hash = es_hash_bytes(hash, &kind, sizeof kind);
@@ -396,5 +361,16 @@ uint64_t es_world_hash(const es_world* world)
     es_world_refresh(world);
     state_io io = {.mode = HASH, .hash = content_signature(world), .good = true};
     visit_world((es_world*)world, &io);
+    return io.hash;
+}
+
+uint64_t es_world_object_hash(const es_world* world, es_object_kind kind, uint32_t id)
+{
+    if (!world || (uint32_t)kind >= ES_OBJECT_KINDS) return 0;
+    void* object = es_world_object(world, kind, id);
+    if (!object) return 0;
+    es_world_refresh(world);
+    state_io io = {.mode = HASH, .hash = id, .good = true};
+    visit_object((es_world*)world, &io, kind, object);
     return io.hash;
 }

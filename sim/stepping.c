@@ -13,8 +13,7 @@ static double tolerance(const es_world* world) { return 1e-4 * (double)world->se
 
 bool es_dynamics_present(const es_world* world)
 {
-    (void)world;
-    return false;
+    return world->slots[ES_OBJECT_BODY].live > 0;
 }
 
 /* What bodies stand on and cloth hangs from is taken to where it is at the step's end. */
@@ -29,7 +28,7 @@ static es_result fixed_step(es_world* world)
     world->fixed_count++;
     pose_at(world, es_fixed_time(world));
     es_nodes_refresh(world);
-    return ES_OK;
+    return es_rigid_step(world, world->settings.step, world->settings.substeps);
 }
 
 float es_step_phase(const es_world* world)
@@ -43,6 +42,7 @@ float es_step_phase(const es_world* world)
 static es_result advance(es_world* world)
 {
     double step = (double)world->settings.step, left = world->time - tolerance(world) - es_fixed_time(world);
+    es_rigid_begin_frame(world);
     if (!es_dynamics_present(world)) {
         if (left > 0) world->fixed_count += (uint64_t)(left / step) + 1;
         return ES_OK;
@@ -69,6 +69,8 @@ es_result es_world_step(es_world* world, float dt)
         es_fp_environment environment = es_fp_enter();
         result = advance(world);
         pose_at(world, world->time);
+        es_nodes_refresh(world); /* what bodies' nodes are below */
+        es_rigid_pose(world, es_step_phase(world));
         es_fp_leave(environment);
         if (world->step_function) world->step_function(world, world->step_user, world->time, (float)seconds);
         world->in_step = false;

@@ -5,6 +5,7 @@
 
 #include "platform/maths.h"
 #include "platform/settings.h"
+#include "sim/rigid/rigid.h"
 
 /* ---- handles ------------------------------------------------------------------------------------------------------------ */
 
@@ -19,6 +20,8 @@ static const struct { const char* name; size_t size; uint32_t limit; } kinds[ES_
     [ES_OBJECT_CLIP] = {"clip", sizeof(es_clip_object), ES_SLOT_LIMIT},
     [ES_OBJECT_MOVER] = {"mover", sizeof(es_mover_object), ES_SLOT_LIMIT},
     [ES_OBJECT_SKIN] = {"skin", sizeof(es_skin_object), ES_SLOT_LIMIT},
+    [ES_OBJECT_BODY] = {"body", sizeof(es_body_object), ES_SLOT_LIMIT},
+    [ES_OBJECT_JOINT] = {"joint", sizeof(es_joint_object), ES_SLOT_LIMIT},
 };
 
 void* es_world_object(const es_world* world, es_object_kind kind, uint32_t id)
@@ -112,6 +115,7 @@ void es_world_destroy(es_world* world)
         es_clip_object* clip = es_slots_at(&world->slots[ES_OBJECT_CLIP], slot);
         if (clip) es_world_destroy_clip(world, (es_clip){clip->object.id});
     }
+    es_rigid_free(world);
     for (int kind = 0; kind < ES_OBJECT_KINDS; kind++) es_slots_free(context, &world->slots[kind]);
     es_environment_free(world);
     es_release(context, world->order, world->order_capacity * sizeof *world->order);

@@ -139,6 +139,9 @@ struct es_world {
     bool camera_dirty, camera_moving;
 
     es_world_revisions revisions;
+
+    es_hand_state hands[ES_HANDS];
+    struct es_rigid* rigid;        /* bodies' common parts (sim/rigid/rigid.h); NULL: there never were any */
 };
 
 /* ---- asking about arguments: OK, or a failure with its message ---------------------------------------------------- */
