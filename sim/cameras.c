@@ -1,5 +1,5 @@
 /* Cameras: lenses on nodes, and their views of this frame and the last. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -68,6 +68,7 @@ es_result es_world_set_camera(es_world* world, es_camera camera, const es_camera
     es_world_rereference(world, ES_OBJECT_NODE, object->desc.node.id, resolved.node.id);
     object->desc = resolved;
     world->camera_dirty = true;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_CAMERA, .id = camera.id, .camera = resolved});
     return ES_OK;
 }
 
@@ -108,6 +109,7 @@ es_result es_world_set_active_camera(es_world* world, es_camera camera)
     if (!camera_object(world, camera)) return ES_STALE_HANDLE;
     world->camera_dirty |= world->active_camera.id != camera.id;
     world->active_camera = camera;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_ACTIVE_CAMERA, .id = camera.id});
     return ES_OK;
 }
 

@@ -2,7 +2,7 @@
  *
  * A clip loops over its duration, the last key time of all its channels; a channel holds its first value before its first
  * key and its last value after its last. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -98,6 +98,7 @@ es_result es_world_play_clip(es_world* world, es_clip clip, bool play)
     if (!object) return ES_STALE_HANDLE;
     if (play && !object->playing) object->start = world->time;
     object->playing = play;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_CLIP, .id = clip.id, .flag = play});
     return ES_OK;
 }
 

@@ -3,7 +3,7 @@
  * The list is rebuilt when an instance, a mesh or a matrix may differ, and the geometry revision goes up only where an
  * entry really does. Its material table is the default material followed by the material slots, so that a material keeps
  * its index for life. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -60,6 +60,7 @@ es_result es_world_set_instance(es_world* world, es_instance instance, const es_
     exchange_references(world, now, desc);
     *now = *desc;
     world->list_dirty = world->geometry_touched = true;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_INSTANCE, .id = instance.id, .instance = *desc});
     return ES_OK;
 }
 

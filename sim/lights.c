@@ -1,5 +1,5 @@
 /* Lights, and their state in world space as the light transport reads it. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -73,6 +73,7 @@ es_result es_world_set_light(es_world* world, es_light light, const es_light_des
     es_world_rereference(world, ES_OBJECT_NODE, object->desc.node.id, resolved.node.id);
     object->desc = resolved;
     world->lights_dirty = true;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_LIGHT, .id = light.id, .light = resolved});
     return ES_OK;
 }
 

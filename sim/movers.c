@@ -2,7 +2,7 @@
  *
  * Everything is a function of the world's time alone, so a mover can be asked about any time and needs no state of its own. Orbits and
  * swings go first, in slot order; aims come after them, since they look at places that may just have moved. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -79,6 +79,7 @@ es_result es_world_set_mover(es_world* world, es_mover mover, const es_mover_des
     if (result != ES_OK) return result;
     exchange_references(world, &object->desc, &resolved);
     object->desc = resolved;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_MOVER, .id = mover.id, .mover = resolved});
     return ES_OK;
 }
 

@@ -2,7 +2,7 @@
  *
  * A parent exists before its child and never changes, so the tree cannot close into a cycle. Matrices are computed in one
  * fixed order, by depth and then by slot, world = parent's world × local: the same bits whichever way the tree was filled. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -85,6 +85,7 @@ es_result es_world_set_node_transform(es_world* world, es_node node, const es_tr
     if (memcmp(&resolved, &object->transform, sizeof resolved) == 0) return ES_OK;
     object->transform = resolved;
     object->dirty = world->nodes_dirty = true;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_NODE, .id = node.id, .transform = resolved});
     return ES_OK;
 }
 

@@ -18,6 +18,7 @@ extern "C" {
 #endif
 
 typedef struct es_world es_world;
+typedef struct es_recording es_recording;
 
 typedef struct es_texture { uint32_t id; } es_texture;
 typedef struct es_material { uint32_t id; } es_material;
@@ -483,6 +484,41 @@ ES_API const char* es_world_name(const es_world* world, es_object_kind kind, uin
 /* Of the object's part of the saved state: where two worlds differ, this says in which object. Textures and materials have none. 0 for a stale
  * handle. */
 ES_API uint64_t es_world_object_hash(const es_world* world, es_object_kind kind, uint32_t id);
+
+/* ---- recording and replay -------------------------------------------------------------------------------------------------------------------------- */
+
+/* A recording notes what its world is told between steps (transforms, cameras, lights, movers, clips, settings; poses, velocities, impulses,
+ * forces and joints of bodies; hands; what is done to cloth; restored states), each step's dt, and hashes of what came of it. It begins
+ * with a saved state, so it may begin at any time. Objects are not to be made or destroyed meanwhile, nor meshes, materials or environments
+ * changed; what a step function does is not noted, as it is there again on replay. One thread at a time uses a recording and its world.
+ *
+ * From the next step on. `scene` and `settings` are any texts by which the world can be opened again, NULL: "". WRONG_STATE while the world is
+ * recorded already. The recording is destroyed by the caller, before or after its world. */
+ES_API es_result es_recording_begin(es_world* world, const char* scene, const char* settings, es_recording** recording);
+/* The world takes no more notes. Destroying the recording, and the world, do the same. */
+ES_API void es_recording_end(es_recording* recording);
+ES_API void es_recording_destroy(es_recording* recording); /* NULL: nothing */
+/* Whole or not at all. */
+ES_API es_result es_recording_save(const es_recording* recording, const char* path);
+/* FILE_TYPE or FILE_DAMAGED when it is none. */
+ES_API es_result es_recording_load(es_context* context, const char* path, es_recording** recording);
+ES_API uint32_t es_recording_steps(const es_recording* recording);
+ES_API float es_recording_dt(const es_recording* recording, uint32_t step);
+ES_API const char* es_recording_scene(const es_recording* recording);    /* valid while the recording is */
+ES_API const char* es_recording_settings(const es_recording* recording);
+
+/* Where a replay went another way. */
+typedef struct es_divergence {
+    bool differs;
+    uint32_t step;            /* counted from 0 */
+    es_object_kind kind;      /* of the first object that differs, causes before consequences: bodies, joints, clips, movers, nodes, … ES_OBJECT_KINDS:
+                               * none does (time or settings do), or there are other objects than there were */
+    uint32_t id;              /* its handle */
+} es_divergence;
+/* Puts the world, opened as the recorded one was, into the recording's first state. WRONG_STATE when its content is another. */
+ES_API es_result es_recording_rewind(const es_recording* recording, es_world* world);
+/* Does what was done before step number `step` and steps. After es_recording_rewind, for 0, 1, … in order. A failure of an input is returned. */
+ES_API es_result es_recording_replay(const es_recording* recording, uint32_t step, es_world* world, es_divergence* divergence);
 
 /* ---- what the light reads ---------------------------------------------------------------------------------------------------------------------------- */
 

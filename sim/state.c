@@ -3,6 +3,7 @@
  * One function visits every piece of state in slot order; it counts, writes, hashes, checks or applies, so the five can
  * never disagree about the layout. A saved state carries a signature of the world's content (which objects exist, how
  * large their meshes are) and a hash of itself: another world's or a damaged buffer is refused before anything is touched. */
+#include "sim/recording.h"
 #include "sim/state_io.h"
 
 #include "sim/rigid/rigid_state.h"
@@ -350,8 +351,11 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     if (io.no_memory) return es_context_last_result(context);
     if (!io.good || io.at != payload_size) return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
     io = (state_io){.mode = APPLY, .bytes = payload, .size = payload_size, .good = true};
+    es_recording* recording = es_recording_pause(world); /* it is one input, not those it is made of */
     visit_world(world, &io);
     es_world_refresh(world);
+    es_recording_resume(world, recording);
+    if (recording) es_note(world, &(es_input){.type = ES_INPUT_RESTORE, .state = {buffer, size}});
     return ES_OK;
 }
 

@@ -3,6 +3,7 @@
  * The dynamics stand at fixed_base + fixed_count × step, the first such time at or after the world's own; what is shown lies between
  * their last two states. Counting instead of adding keeps the steps where they are however time is cut into frames. */
 #include "sim/dynamics.h"
+#include "sim/recording.h"
 
 #include "platform/context.h"
 
@@ -76,5 +77,6 @@ es_result es_world_step(es_world* world, float dt)
         world->in_step = false;
     }
     es_world_refresh(world);
+    if (world->recording) es_recording_note_step(world, dt);
     return result;
 }

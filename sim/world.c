@@ -99,6 +99,7 @@ void es_world_destroy(es_world* world)
         es_misuse(context, ES_WRONG_STATE, "es_world_destroy: called from a step function; the world is kept");
         return;
     }
+    es_recording_end(world->recording);
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_TEXTURE].slot_count; slot++) {
         es_texture_object* texture = es_slots_at(&world->slots[ES_OBJECT_TEXTURE], slot);
         if (texture) es_texture_image_destroy(context, &texture->image);

@@ -138,6 +138,8 @@ struct es_world {
     es_camera_state camera_state;
     bool camera_dirty, camera_moving;
 
+    es_recording* recording;       /* that takes notes; NULL: none */
+
     es_world_revisions revisions;
 
     es_hand_state hands[ES_HANDS];

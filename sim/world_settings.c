@@ -1,5 +1,5 @@
 /* The world's settings: names, ranges, defaults. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include "platform/settings.h"
 
@@ -54,6 +54,7 @@ es_result es_world_configure(es_world* world, const es_world_settings* settings)
     resolved.clip = world->settings.clip;
     resolved.default_light = world->settings.default_light;
     world->settings = resolved;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_CONFIGURE, .settings = resolved});
     return ES_OK;
 }
 

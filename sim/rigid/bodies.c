@@ -7,6 +7,7 @@
 #include "sim/rigid/joints.h"
 #include "sim/rigid/node_pose.h"
 #include "sim/rigid/rigid.h"
+#include "sim/recording.h"
 
 es_body_desc es_default_body_desc(void)
 {
@@ -287,6 +288,7 @@ es_result es_world_set_body_pose(es_world* world, es_body body, const double pos
     forget_motion(object);
     es_body_refresh_tree(world, object, es_v3(0, 0, 0));
     if (object->type == ES_BODY_DYNAMIC && object->node.id) es_node_set_pose(world, object->node, position, object->rotation);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_BODY_POSE, .id = body.id, .place = {position[0], position[1], position[2]}, .rotation = rotation});
     return ES_OK;
 }
 
@@ -302,6 +304,7 @@ es_result es_world_set_body_velocity(es_world* world, es_body body, es_vec3 velo
     object->velocity = velocity;
     object->angular_velocity = angular_velocity;
     es_body_wake(world, object);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_BODY_VELOCITY, .id = body.id, .a = velocity, .b = angular_velocity});
     return ES_OK;
 }
 
@@ -327,6 +330,14 @@ static es_body_object* pushed(es_world* world, es_body body, const es_vec3* push
     return object->type == ES_BODY_DYNAMIC ? object : NULL;
 }
 
+static void note_push(es_world* world, es_input_type type, es_body body, es_vec3 push, const double at[3])
+{
+    if (!world->recording) return;
+    es_input input = {.type = type, .id = body.id, .a = push, .flag = at != NULL};
+    for (int k = 0; at && k < 3; k++) input.place[k] = at[k];
+    es_note(world, &input);
+}
+
 es_result es_world_apply_impulse(es_world* world, es_body body, es_vec3 impulse, const double at[3])
 {
     if (!world) return ES_INVALID_ARGUMENT;
@@ -336,6 +347,7 @@ es_result es_world_apply_impulse(es_world* world, es_body body, es_vec3 impulse,
     if (!object) return result;
     es_body_push(object, impulse, es_v3_cross(lever, impulse));
     es_body_wake(world, object);
+    note_push(world, ES_INPUT_IMPULSE, body, impulse, at);
     return ES_OK;
 }
 
@@ -352,6 +364,7 @@ es_result es_world_apply_force(es_world* world, es_body body, es_vec3 force, con
         (&object->torque.x)[k] = es_clampf((&torque.x)[k], -1e24f, 1e24f);
     }
     es_body_wake(world, object);
+    note_push(world, ES_INPUT_FORCE, body, force, at);
     return ES_OK;
 }
 
@@ -361,6 +374,7 @@ es_result es_world_wake_body(es_world* world, es_body body)
     es_body_object* object = es_world_object(world, ES_OBJECT_BODY, body.id);
     if (!object) return ES_STALE_HANDLE;
     es_body_wake(world, object);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_WAKE, .id = body.id});
     return ES_OK;
 }
 

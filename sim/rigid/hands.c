@@ -2,6 +2,7 @@
 #include "sim/rigid/hands.h"
 
 #include "platform/maths.h"
+#include "sim/recording.h"
 #include "sim/rigid/rigid.h"
 
 bool es_hand_holds_body(const es_world* world, uint32_t hand) { return es_slots_get(&world->slots[ES_OBJECT_BODY], world->hands[hand].body.id) != NULL; }
@@ -28,6 +29,7 @@ es_result es_world_grab_body(es_world* world, uint32_t hand, es_body body, es_ve
     es_hand_state* state = &world->hands[hand];
     *state = (es_hand_state){.body = body, .local_point = local_point, .target = {target[0], target[1], target[2]}, .max_force = max_force > 0 ? max_force : es_minf(1000.0f * object->mass, 1e12f)};
     es_body_wake(world, object);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_GRAB_BODY, .id = hand, .other = body.id, .a = local_point, .place = {target[0], target[1], target[2]}, .number = max_force});
     return ES_OK;
 }
 
@@ -37,6 +39,7 @@ es_result es_world_move_hand(es_world* world, uint32_t hand, const double target
     if (hand >= ES_HANDS) return bad_hand(world, hand);
     if (!target || !good_place(target)) return es_fail(world->context, ES_INVALID_ARGUMENT, "hand %u: its place must be finite and within 1e9", hand);
     for (int k = 0; k < 3; k++) world->hands[hand].target[k] = target[k];
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_MOVE_HAND, .id = hand, .place = {target[0], target[1], target[2]}});
     return ES_OK;
 }
 
@@ -45,6 +48,7 @@ es_result es_world_release(es_world* world, uint32_t hand)
     if (!world) return ES_INVALID_ARGUMENT;
     if (hand >= ES_HANDS) return bad_hand(world, hand);
     world->hands[hand] = (es_hand_state){0};
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_RELEASE, .id = hand});
     return ES_OK;
 }
 

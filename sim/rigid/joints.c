@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "platform/maths.h"
+#include "sim/recording.h"
 #include "sim/rigid/rigid_state.h"
 
 es_joint_desc es_default_joint_desc(void)
@@ -176,6 +177,7 @@ es_result es_world_set_joint(es_world* world, es_joint joint, const es_joint_des
     es_fp_leave(environment);
     wake(world, object->desc.a);
     wake(world, object->desc.b);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_JOINT, .id = joint.id, .joint = wanted});
     return ES_OK;
 }
 
