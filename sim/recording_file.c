@@ -1,4 +1,4 @@
-/* Recordings on disk: a header with the sizes of what follows and a hash of it, then the parts one after another, little-endian.
+/* Recordings on disk: a header with the sizes of what follows and a hash of all, then the parts one after another, little-endian.
  *
  * A file is written beside its name and renamed, so it is whole or not there. One that is read is checked in all its parts before any
  * of it is used: sizes against the file, the hash, every step's ranges, every input. */
@@ -13,7 +13,7 @@
 
 typedef struct file_header {
     char magic[8];
-    uint64_t payload;         /* hash of all that follows the header */
+    uint64_t payload;         /* hash of everything else */
     uint64_t scene_size, settings_size, first_size, first_hash, step_count, input_size, hash_count;
 } file_header;
 
@@ -34,9 +34,12 @@ static void parts_of(const es_recording* r, const file_header* h, part parts[PAR
     parts[5] = (part){r->hashes, (size_t)h->hash_count * sizeof *r->hashes};
 }
 
-static uint64_t payload_of(const part parts[PARTS])
+/* Of the header without it, and of all parts. */
+static uint64_t payload_of(const file_header* header, const part parts[PARTS])
 {
-    uint64_t hash = 0;
+    file_header h = *header;
+    h.payload = 0;
+    uint64_t hash = es_hash_bytes(0, &h, sizeof h);
     for (int i = 0; i < PARTS; i++) hash = es_hash_bytes(hash, parts[i].bytes, parts[i].size);
     return hash;
 }
@@ -57,7 +60,7 @@ es_result es_recording_save(const es_recording* recording, const char* path)
     memcpy(header.magic, magic, sizeof magic);
     part parts[PARTS];
     parts_of(recording, &header, parts);
-    header.payload = payload_of(parts);
+    header.payload = payload_of(&header, parts);
     errno = 0;
     FILE* file = fopen(temporary, "wb");
     bool good = file && fwrite(&header, sizeof header, 1, file) == 1;
@@ -124,7 +127,7 @@ static es_result read_parts(es_context* context, FILE* file, const char* path, c
     parts_of(r, h, parts);
     bool good = true;
     for (int i = 0; i < PARTS && good; i++) good = fread(parts[i].bytes, 1, parts[i].size, file) == parts[i].size;
-    good = good && payload_of(parts) == h->payload && !memchr(r->scene, 0, (size_t)h->scene_size) && !memchr(r->settings, 0, (size_t)h->settings_size) && content_valid(r);
+    good = good && payload_of(h, parts) == h->payload && !memchr(r->scene, 0, (size_t)h->scene_size) && !memchr(r->settings, 0, (size_t)h->settings_size) && content_valid(r);
     if (good) {
         *out = r;
         return ES_OK;

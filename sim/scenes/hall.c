@@ -10,7 +10,7 @@
  *
  * Shell, columns, arcades, vault, beams and banners are closed solids that overlap where they meet, so no light slips
  * through a joint. */
-#include "sim/scenes/scene_tools.h"
+#include "sim/scenes/hall.h"
 
 #include "platform/maths.h"
 
@@ -426,42 +426,46 @@ static void spot_pose(float phase, es_vec3* translation, es_quat* rotation)
     *rotation = es_look_rotation(es_v3_sub(target, *translation));
 }
 
-es_result es_scene_hall(es_world* world, uint32_t triangles)
+void es_build_hall(es_scene_builder* builder, uint32_t triangles)
 {
-    es_scene_builder builder = {world, ES_OK};
     /* boxes and slabs stay as they are; everything curved is scaled */
     float scaled = es_maxf((float)triangles - (float)FIXED_TRIANGLES, 1000.0f);
     detail d = {triangles ? es_sqrt(scaled / (float)SCALED_TRIANGLES) : 1.0f};
-    es_material stone = es_build_lambert(&builder, "limestone", 0.70f, 0.64f, 0.54f);
-    es_material plaster = es_build_lambert(&builder, "plaster", 0.78f, 0.73f, 0.64f);
-    es_material dark = es_build_lambert(&builder, "mortar", 0.30f, 0.27f, 0.24f);
-    es_material vault_paint = es_build_lambert(&builder, "vault", 0.72f, 0.70f, 0.66f);
-    add_shell(&builder, stone, plaster, dark);
-    add_floor(&builder);
-    add_far_end(&builder, &d, stone);
+    es_material stone = es_build_lambert(builder, "limestone", 0.70f, 0.64f, 0.54f);
+    es_material plaster = es_build_lambert(builder, "plaster", 0.78f, 0.73f, 0.64f);
+    es_material dark = es_build_lambert(builder, "mortar", 0.30f, 0.27f, 0.24f);
+    es_material vault_paint = es_build_lambert(builder, "vault", 0.72f, 0.70f, 0.66f);
+    add_shell(builder, stone, plaster, dark);
+    add_floor(builder);
+    add_far_end(builder, &d, stone);
 
-    es_mesh column = build_column(&builder, &d), arch = build_arch(&builder, &d), vault = build_vault(&builder, &d);
-    es_build_instance(&builder, es_build_node(&builder, "vault", es_v3(0, 0, 0), es_quat_identity()), vault, vault_paint);
+    es_mesh column = build_column(builder, &d), arch = build_arch(builder, &d), vault = build_vault(builder, &d);
+    es_build_instance(builder, es_build_node(builder, "vault", es_v3(0, 0, 0), es_quat_identity()), vault, vault_paint);
     for (int side = -1; side <= 1; side += 2)
         for (int k = 0; k <= BAYS; k++) {
             float x = axis_x * (float)side;
-            if (k > 0 && k < BAYS) es_build_instance(&builder, es_build_node(&builder, "column", es_v3(x, 0, bay_line(k)), es_quat_identity()), column, stone);
-            if (k < BAYS) es_build_instance(&builder, es_build_node(&builder, "arch", es_v3(x, 0, bay_line(k) + 0.5f * bay), es_quat_identity()), arch, plaster);
+            if (k > 0 && k < BAYS) es_build_instance(builder, es_build_node(builder, "column", es_v3(x, 0, bay_line(k)), es_quat_identity()), column, stone);
+            if (k < BAYS) es_build_instance(builder, es_build_node(builder, "arch", es_v3(x, 0, bay_line(k) + 0.5f * bay), es_quat_identity()), arch, plaster);
         }
 
-    const es_material dyes[3] = {es_build_lambert(&builder, "madder red", 0.60f, 0.05f, 0.04f), es_build_lambert(&builder, "woad blue", 0.06f, 0.13f, 0.42f),
-        es_build_lambert(&builder, "weld yellow", 0.72f, 0.47f, 0.08f)};
+    const es_material dyes[3] = {es_build_lambert(builder, "madder red", 0.60f, 0.05f, 0.04f), es_build_lambert(builder, "woad blue", 0.06f, 0.13f, 0.42f),
+        es_build_lambert(builder, "weld yellow", 0.72f, 0.47f, 0.08f)};
     for (int k = 1; k < BAYS - 1; k++) {
-        es_mesh banner = build_banner(&builder, &d, 1.7f * (float)k);
-        es_build_instance(&builder, es_build_node(&builder, "banner", es_v3(-axis_x, 5.55f, bay_line(k) + 0.5f * bay), es_quat_identity()), banner, dyes[k % 3]);
+        es_mesh banner = build_banner(builder, &d, 1.7f * (float)k);
+        es_build_instance(builder, es_build_node(builder, "banner", es_v3(-axis_x, 5.55f, bay_line(k) + 0.5f * bay), es_quat_identity()), banner, dyes[k % 3]);
     }
-    es_shape rods = begin(&builder);
+    es_shape rods = begin(builder);
     for (int k = 1; k < BAYS - 1; k++) {
         float z = bay_line(k) + 0.5f * bay;
         es_shape_box(&rods, es_v3(-axis_x - 0.025f, 5.53f, z - 0.9f), es_v3(-axis_x + 0.025f, 5.58f, z + 0.9f));
     }
-    es_build_object(&builder, "rods", &rods, dark, es_v3(0, 0, 0));
+    es_build_object(builder, "rods", &rods, dark, es_v3(0, 0, 0));
+}
 
+es_result es_scene_hall(es_world* world, uint32_t triangles)
+{
+    es_scene_builder builder = {world, ES_OK};
+    es_build_hall(&builder, triangles);
     es_build_camera(&builder, es_v3(0.55f, 1.75f, 11.6f), es_v3(-0.09f, 0.13f, -1), 1.02f, 0.1f);
     es_node spot = es_build_spot(&builder, es_v3(4.9f, 5.0f, 9.0f), es_v3(-1, -1, -1), (const float[3]){1.0f, 0.90f, 0.74f}, 1200.0f, 0.30f, 0.48f);
     es_build_clip(&builder, "light", PERIOD, KEYS, &(es_motion){spot, spot_pose}, 1);

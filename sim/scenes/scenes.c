@@ -12,6 +12,11 @@ static const es_scene scenes[] = {
     {"cornell", "a Cornell box with four moving objects under a moving spot light (3,372 triangles)", es_scene_cornell},
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
     {"hall", "a colonnade lit from its side aisle, for the most part by what the walls give back (108,516 triangles)", es_scene_hall},
+    {"cornell-stack", "a stack of cubes in a Cornell box, a ball that brings it down, a lamp that sways (3,372 triangles)", es_scene_cornell_stack},
+    {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature},
+    {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk},
+    {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things},
+    {"stress", "everything fast: bodies that bounce without loss, a light that sweeps and flickers", es_scene_stress},
 };
 
 size_t es_scene_count(void) { return sizeof scenes / sizeof scenes[0]; }

@@ -15,5 +15,10 @@ typedef struct es_scene {
 es_result es_scene_cornell(es_world* world, uint32_t triangles);
 es_result es_scene_room(es_world* world, uint32_t triangles);
 es_result es_scene_hall(es_world* world, uint32_t triangles);
+es_result es_scene_cornell_stack(es_world* world, uint32_t triangles);
+es_result es_scene_rain_of_things(es_world* world, uint32_t triangles);
+es_result es_scene_stress(es_world* world, uint32_t triangles);
+es_result es_scene_creature(es_world* world, uint32_t triangles);
+es_result es_scene_lantern_walk(es_world* world, uint32_t triangles);
 
 #endif
