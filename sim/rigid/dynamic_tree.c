@@ -133,7 +133,8 @@ static void fix_upwards(es_dynamic_tree* tree, uint32_t at)
     }
 }
 
-/* Goes down where the area grows least, until a new parent here costs less than going on could. */
+/* Goes down to a leaf, where the area grows least. (To stop above would sometimes be a little cheaper, but puts a leaf beside a high subtree, and
+ * one rotation on the way up would not make up for it.) */
 static void insert(es_dynamic_tree* tree, uint32_t leaf)
 {
     es_tree_node* nodes = tree->nodes;
@@ -145,15 +146,12 @@ static void insert(es_dynamic_tree* tree, uint32_t leaf)
     const es_tree_box box = nodes[leaf].fat;
     uint32_t sibling = tree->root;
     while (!is_leaf(&nodes[sibling])) {
-        es_tree_box joined = join(&nodes[sibling].fat, &box);
-        float area = half_area(&nodes[sibling].fat), joined_area = half_area(&joined);
-        float here = 2 * joined_area, inherited = 2 * (joined_area - area), cost[2];
+        float cost[2];
         for (int k = 0; k < 2; k++) {
             const es_tree_node* child = &nodes[nodes[sibling].child[k]];
             es_tree_box with = join(&child->fat, &box);
-            cost[k] = half_area(&with) + inherited - (is_leaf(child) ? 0 : half_area(&child->fat));
+            cost[k] = half_area(&with) - (is_leaf(child) ? 0 : half_area(&child->fat));
         }
-        if (here < cost[0] && here < cost[1]) break;
         sibling = nodes[sibling].child[cost[1] < cost[0]];
     }
     uint32_t old_parent = nodes[sibling].parent, parent = take_node(tree);

@@ -1,13 +1,13 @@
 /* A tree of boxes that move: broad phase of the rigid bodies, and what rays and boxes are asked against.
  *
  * Each proxy has a tight box (as given) and a fat one around it, so that small moves leave the tree as it is. Leaves are put where
- * the surface area grows least, and rotations keep the tree good. What is reported is decided by tight boxes alone and sorted
+ * the surface area grows least, and rotations keep heights balanced. What is reported is decided by tight boxes alone and sorted
  * by the proxies' keys: it depends neither on the tree's structure nor on its history, and a tree built anew from the same tight boxes
  * reports the same.
  *
  * Boxes are relative to an origin of the caller's choice; when that moves, es_dynamic_tree_clear and add again. One thread changes the
  * tree; any number may query it while none does.
- * Sources: Catto, "Dynamic Bounding Volume Hierarchies", GDC 2019; Bittner et al. 2013 (insertion by branch and bound). */
+ * Source: Catto, "Dynamic Bounding Volume Hierarchies", GDC 2019. */
 #ifndef EARTHSHINE_SIM_RIGID_DYNAMIC_TREE_H
 #define EARTHSHINE_SIM_RIGID_DYNAMIC_TREE_H
 
