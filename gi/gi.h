@@ -29,6 +29,18 @@ typedef enum es_traced_bias {
     ES_TRACED_COMPENSATED   /* all of them, and what they leave out found by rays (Kollig and Keller 2004): right on average, without spots */
 } es_traced_bias;
 
+/* Where the light of the last frame comes in. */
+typedef enum es_temporal_stage {
+    ES_TEMPORAL_AFTER_FILTER,  /* smooth light is compared with smooth light */
+    ES_TEMPORAL_BEFORE_FILTER  /* as Knecht does (§3.4.1): history keeps the interleaved pattern, and is filtered with the rest */
+} es_temporal_stage;
+
+typedef enum es_antialias {
+    ES_ANTIALIAS_NONE,        /* pixels are sampled at their centres */
+    ES_ANTIALIAS_TEMPORAL,    /* at another place each frame, resolved over frames by motion; still pictures become the mean over all places */
+    ES_ANTIALIAS_SUPERSAMPLE  /* the mean over antialias_samples whole pictures, each frame by itself: for stills and recordings */
+} es_antialias;
+
 typedef enum es_tone_map { ES_TONE_MAP_REINHARD, ES_TONE_MAP_PBR_NEUTRAL, ES_TONE_MAP_LINEAR } es_tone_map;
 
 /* All of them by name through es_renderer_settings_set; `earthshine settings` prints names, ranges and defaults. */
@@ -77,6 +89,23 @@ typedef struct es_renderer_settings {
     float filter_depth;              /* largest relative depth difference (Knecht: 0.01) */
     float filter_normal;             /* smallest dot product of normals (Knecht: 0.8) */
     bool half_resolution;            /* indirect light is shaded and filtered for one pixel of 2 × 2, and interpolated along surfaces for the others */
+    /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
+    bool temporal;
+    uint32_t temporal_stage;         /* es_temporal_stage */
+    float temporal_base;             /* eq. 3.4: confidence where nothing changes (§5.2: 0.9) */
+    float temporal_position;         /* eq. 3.1: weight of movement, in shares of the picture and of the scene's extent */
+    float temporal_normal;           /* eq. 3.2: weight of 1 - n · n_prev */
+    float temporal_illumination;     /* eq. 3.3: weight of the cubed difference of the light a white surface would show at the exposure */
+    float temporal_depth_threshold;  /* disocclusion: largest relative difference of depth from where the surface was */
+    float temporal_normal_threshold; /* disocclusion: smallest dot product with last frame's normal */
+    float temporal_clamp;            /* last frame's light is kept within the neighbours' of this one, widened by this share; 0: it is not clamped */
+    float temporal_reset_low;        /* share by which the light of a tile may differ from its history's before the confidence falls … */
+    float temporal_reset_high;       /* … and from which on history is not used; 0: tiles are not compared */
+    uint32_t temporal_settle;        /* frames without a change after which a picture is settled: history is no longer used, and nothing is left to do */
+    /* anti-aliasing */
+    uint32_t antialias;              /* es_antialias */
+    uint32_t antialias_samples;      /* places inside a pixel, over frames (TEMPORAL) or in each (SUPERSAMPLE) */
+    float antialias_blend;           /* TEMPORAL: share of the new frame where things move */
     /* display */
     uint32_t tone_map;               /* es_tone_map */
     float exposure;                  /* stops */

@@ -23,6 +23,8 @@ static void halve_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker
             to->albedo_rg[row + x] = from->albedo_rg[at];
             to->albedo_b[row + x] = from->albedo_b[at];
             to->surface[row + x] = from->surface[at];
+            to->motion_x[row + x] = 0.5f * from->motion_x[at];
+            to->motion_y[row + x] = 0.5f * from->motion_y[at];
         }
     }
 }
@@ -32,7 +34,7 @@ es_result es_gbuffer_halve(es_context* context, const es_gbuffer* whole, es_gbuf
     const uint32_t width = (whole->width + 1) / 2, height = (whole->height + 1) / 2;
     if (!half->memory || half->width != width || half->height != height) {
         es_gbuffer_destroy(context, half);
-        es_result result = es_gbuffer_create(context, width, height, ES_GBUFFER_DEPTH | ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL | ES_GBUFFER_ALBEDO | ES_GBUFFER_SURFACE, half);
+        es_result result = es_gbuffer_create(context, width, height, ES_GBUFFER_DEPTH | ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL | ES_GBUFFER_ALBEDO | ES_GBUFFER_SURFACE | ES_GBUFFER_MOTION, half);
         if (result) return result;
     }
     halve_loop loop = {whole, half};

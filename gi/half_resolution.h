@@ -10,7 +10,7 @@
 #include "gi/gi.h"
 #include "gi/pixel_rays.h"
 
-/* Depth, both normals, albedo and surface of every second pixel of every second row; `half` is reallocated when its size changes. */
+/* Depth, both normals, albedo, surface and motion, in its own pixels, of every second pixel of every second row; `half` is reallocated when its size changes. */
 es_result es_gbuffer_halve(es_context* context, const es_gbuffer* whole, es_gbuffer* half);
 es_pixel_rays es_pixel_rays_halve(const es_pixel_rays* whole);
 

@@ -10,7 +10,7 @@
 typedef enum image_kind {
     IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
-    IMAGE_IMPORTANCE, IMAGE_ISM
+    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
@@ -20,6 +20,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
     {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
+    {IMAGE_CONFIDENCE, "confidence", "in last frame's indirect light, 0 to 1 (Knecht eq. 3.4)"},
     {IMAGE_COMPENSATION, "compensation", "of the indirect light, what traced.bias compensated finds by rays, W/(m² sr), of either sign"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
     {IMAGE_NORMAL, "normal", "world shading normal"},
@@ -153,6 +154,20 @@ static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* 
     return ES_OK;
 }
 
+static es_result put_confidence(es_renderer* renderer, es_image* image)
+{
+    const es_gbuffer* g = renderer->history.job.gbuffer ? renderer->history.job.gbuffer : &renderer->gbuffer;
+    const size_t floats = (size_t)g->stride * g->height;
+    const uint32_t step = g->width < image->width || g->height < image->height ? 2 : 1; /* at half the resolution */
+    float* confidence = es_allocate_array(renderer->context, floats, sizeof *confidence);
+    if (!confidence) return es_context_last_result(renderer->context);
+    es_result result = es_temporal_confidence(renderer, confidence);
+    for (uint32_t y = 0; y < image->height && !result; y++)
+        for (uint32_t x = 0; x < image->width; x++) image->pixels[(size_t)y * image->width + x] = confidence[(size_t)(y / step) * g->stride + x / step];
+    es_release(renderer->context, confidence, floats * sizeof *confidence);
+    return result;
+}
+
 /* ---- of the light ---------------------------------------------------------------------------------------------------------------- */
 
 static void put_shadow_map(const es_light_view* view, es_image* image)
@@ -240,7 +255,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         width = height = 8; /* a black image: the frame has no such thing */
         light = NULL;
     }
-    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM;
+    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE;
     if (single) channels = 1;
     if (kind == IMAGE_MOTION) channels = 2;
     es_result result = es_image_create(context, width, height, channels, image);
@@ -260,6 +275,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }
+    case IMAGE_CONFIDENCE: result = put_confidence(renderer, image); break;
     case IMAGE_ALBEDO: put_albedo(g, 0, image); break;
     case IMAGE_NORMAL: put_normal(g->normal, g->depth, g->stride, image); break;
     case IMAGE_GEOMETRIC_NORMAL: put_normal(g->geometric_normal, g->depth, g->stride, image); break;

@@ -30,7 +30,7 @@ static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* lis
 }
 
 /* What the indirect light is shaded and filtered on. */
-static const es_gbuffer* shaded_gbuffer(const es_renderer* r) { return r->frame.settings.half_resolution ? &r->half : &r->gbuffer; }
+const es_gbuffer* es_indirect_gbuffer(const es_renderer* r) { return r->frame.settings.half_resolution ? &r->half : &r->gbuffer; }
 
 /* At every pixel, whatever the setting of the pattern. */
 static bool every_light(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED && !s->traced_interleave; }
@@ -44,7 +44,7 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
     const es_renderer_settings* s = &r->frame.settings;
     const float extent = r->frame.extent, near = near_distance_of(r);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, traced = sampled || s->method == ES_GI_VPL_TRACED;
-    const es_gbuffer* shaded = shaded_gbuffer(r);
+    const es_gbuffer* shaded = es_indirect_gbuffer(r);
     es_result result = es_planes_resize(r->context, irradiance, shaded);
     if (!result && r->has_specular) result = es_planes_resize(r->context, specular, shaded);
     if (result) return result;
@@ -96,19 +96,26 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
-    es_result result = s->half_resolution ? es_gbuffer_halve(r->context, &r->gbuffer, &r->half) : ES_OK;
+    es_result result = ES_OK;
+    if (s->half_resolution && r->history.wanted && r->half.memory && !plan->stats[ES_PASS_VISIBILITY].skipped) result = es_history_keep(r->context, &r->half, &r->history.half);
+    if (s->half_resolution && !result) result = es_gbuffer_halve(r->context, &r->gbuffer, &r->half);
     if (!result) result = es_indirect_shade(r, r->vpl_count, &r->irradiance, &r->specular);
-    const es_gbuffer* shaded = shaded_gbuffer(r);
+    const es_gbuffer* shaded = es_indirect_gbuffer(r);
     if (!result) es_plan_done(plan, ES_PASS_SHADING, (uint64_t)shaded->width * shaded->height * r->vpl_count / (interleave * interleave));
     return result;
 }
+
+/* Last frame's light has come in before the filter. */
+static bool blended_first(const es_renderer* r) { return r->plan.valid[ES_PASS_TEMPORAL] && r->frame.settings.temporal_stage == ES_TEMPORAL_BEFORE_FILTER; }
+static const es_planes* shaded_irradiance(const es_renderer* r) { return blended_first(r) ? &r->history.irradiance[r->history.current] : &r->irradiance; }
+static const es_planes* shaded_specular(const es_renderer* r) { return blended_first(r) ? &r->history.specular[r->history.current] : &r->specular; }
 
 /* ---- filter ------------------------------------------------------------------------------------------------------------------ */
 
 es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes stages_irradiance[2], es_planes stages_specular[2])
 {
     const es_renderer_settings* s = &r->frame.settings;
-    const es_gbuffer* shaded = shaded_gbuffer(r);
+    const es_gbuffer* shaded = es_indirect_gbuffer(r);
     es_result result = ES_OK;
     for (uint32_t i = 0; i < 2 && i < r->filter_passes && !result; i++) {
         result = es_planes_resize(r->context, &stages_irradiance[i], shaded);
@@ -143,17 +150,30 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_FILTER);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
+    if (blended_first(r)) es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
-    es_result result = es_indirect_filter(r, &r->irradiance, &r->specular, r->filtered_irradiance, r->filtered_specular);
-    const es_gbuffer* shaded = shaded_gbuffer(r);
+    es_result result = es_indirect_filter(r, shaded_irradiance(r), shaded_specular(r), r->filtered_irradiance, r->filtered_specular);
+    const es_gbuffer* shaded = es_indirect_gbuffer(r);
     if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)shaded->width * shaded->height * s->filter_passes);
     return result;
 }
 
-static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : &r->irradiance; }
-static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : &r->specular; }
+static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : shaded_irradiance(r); }
+static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : shaded_specular(r); }
+
+void es_indirect_unblended(const es_renderer* r, const es_planes** irradiance, const es_planes** specular)
+{
+    const bool first = r->frame.settings.temporal_stage == ES_TEMPORAL_BEFORE_FILTER;
+    *irradiance = first ? &r->irradiance : filtered_irradiance(r);
+    *specular = first ? &r->specular : filtered_specular(r);
+}
+
+/* With last frame's, wherever that comes in. */
+static bool blended_last(const es_renderer* r) { return r->plan.valid[ES_PASS_TEMPORAL] && !blended_first(r); }
+static const es_planes* blended_irradiance(const es_renderer* r) { return blended_last(r) ? &r->history.irradiance[r->history.current] : filtered_irradiance(r); }
+static const es_planes* blended_specular(const es_renderer* r) { return blended_last(r) ? &r->history.specular[r->history.current] : filtered_specular(r); }
 
 /* ---- interpolation ------------------------------------------------------------------------------------------------------------ */
 
@@ -187,13 +207,14 @@ es_result es_pass_upsample(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     float numbers[] = {s->filter_depth, s->filter_normal, r->has_specular};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_UPSAMPLE)) return ES_OK;
-    es_result result = es_indirect_upsample(r, filtered_irradiance(r), filtered_specular(r), &r->upsampled_irradiance, &r->upsampled_specular);
+    es_result result = es_indirect_upsample(r, blended_irradiance(r), blended_specular(r), &r->upsampled_irradiance, &r->upsampled_specular);
     if (!result) es_plan_done(plan, ES_PASS_UPSAMPLE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
     return result;
 }
 
-const es_planes* es_indirect_irradiance(const es_renderer* r) { return r->plan.valid[ES_PASS_UPSAMPLE] ? &r->upsampled_irradiance : filtered_irradiance(r); }
-const es_planes* es_indirect_specular(const es_renderer* r) { return r->plan.valid[ES_PASS_UPSAMPLE] ? &r->upsampled_specular : filtered_specular(r); }
+const es_planes* es_indirect_irradiance(const es_renderer* r) { return r->plan.valid[ES_PASS_UPSAMPLE] ? &r->upsampled_irradiance : blended_irradiance(r); }
+const es_planes* es_indirect_specular(const es_renderer* r) { return r->plan.valid[ES_PASS_UPSAMPLE] ? &r->upsampled_specular : blended_specular(r); }

@@ -16,6 +16,10 @@ es_result es_indirect_shade(es_renderer* renderer, uint32_t lights, es_planes* i
 es_result es_indirect_filter(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes stages_irradiance[2], es_planes stages_specular[2]);
 es_result es_indirect_upsample(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes* whole_irradiance, es_planes* whole_specular);
 
+/* What that light is shaded, filtered and blended with last frame's on. */
+const es_gbuffer* es_indirect_gbuffer(const es_renderer* renderer);
+/* What last frame's light is to be blended with. */
+void es_indirect_unblended(const es_renderer* renderer, const es_planes** irradiance, const es_planes** specular);
 /* What the frame shows, after filter and interpolation. */
 const es_planes* es_indirect_irradiance(const es_renderer* renderer);
 const es_planes* es_indirect_specular(const es_renderer* renderer);

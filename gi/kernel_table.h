@@ -11,6 +11,7 @@
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
 #include "gi/shade.h"
+#include "gi/temporal.h"
 #include "gi/view_importance.h"
 #include "gi/vpl.h"
 
@@ -27,6 +28,9 @@
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
+    /* a row of tiles */                                                                                          \
+    X(temporal_compare, (const es_temporal_job* job, uint32_t tile_row, float* shares))                          \
+    X(temporal_blend, (const es_temporal_job* job, uint32_t row_begin, uint32_t row_end))                        \
     /* the tile whose first pixel is (x, y), once it is loaded */                                                \
     X(flip, (const es_flip_job* job, uint32_t x, uint32_t y, const es_flip_scratch* scratch))                    \
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \

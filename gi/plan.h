@@ -21,6 +21,7 @@
     X(SHADING, "shading", "samples")                                                                             \
     X(COMPENSATION, "bias compensation", "samples")                                                              \
     X(FILTER, "filter", "pixels")                                                                                \
+    X(TEMPORAL, "temporal coherence", "pixels")                                                                  \
     X(UPSAMPLE, "upsample", "pixels")                                                                            \
     X(COMPOSE, "compose", "pixels")
 

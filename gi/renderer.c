@@ -83,6 +83,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->irradiance);
     es_planes_free(context, &renderer->specular);
     es_planes_free(context, &renderer->compensation);
+    es_history_free(context, &renderer->history);
     for (int i = 0; i < 2; i++) {
         es_planes_free(context, &renderer->filtered_irradiance[i]);
         es_planes_free(context, &renderer->filtered_specular[i]);
@@ -175,11 +176,12 @@ static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(&r->plan, &r->view, sizeof r->view);
     es_plan_reads(&r->plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(&r->plan, &in->revisions.materials, sizeof in->revisions.materials);
-    /* motion depends on last frame's pose as well: while anything moves, every frame is new */
-    uint64_t moving = in->revisions.moving ? r->frames + 1 : 0;
+    /* motion depends on last frame's pose as well: while anything moves, every step is new */
+    uint64_t moving = in->revisions.moving ? in->revisions.steps : 0;
     es_plan_reads(&r->plan, &moving, sizeof moving);
     if (!es_plan_run(&r->plan, ES_PASS_VISIBILITY)) return ES_OK;
-    es_result result = es_draw_gbuffer(r->rasterizer, in->list, &r->view, &r->gbuffer, &r->stats.raster);
+    es_result result = r->history.wanted ? es_history_keep(r->context, &r->gbuffer, &r->history.gbuffer) : ES_OK;
+    if (!result) result = es_draw_gbuffer(r->rasterizer, in->list, &r->view, &r->gbuffer, &r->stats.raster);
     if (!result) es_plan_done(&r->plan, ES_PASS_VISIBILITY, r->stats.raster.triangles);
     return result;
 }
@@ -398,6 +400,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL};
@@ -419,8 +422,6 @@ static es_result render(es_renderer* r, es_world* world)
     if (result) return result;
     result = es_world_camera_view(world, camera, r->settings.width, r->settings.height, &r->view);
     if (result) return result;
-    r->rays = es_pixel_rays_of_view(&r->view);
-
     es_frame_inputs in = {.list = es_world_draw_list(world), .revisions = es_world_get_revisions(world)};
     size_t light_count;
     in.lights = es_world_lights(world, &light_count);
@@ -431,6 +432,9 @@ static es_result render(es_renderer* r, es_world* world)
     in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
 
     r->frame = (es_frame_settings){*s, in.extent};
+    es_history_begin(r, &in, world);
+    r->rays = es_pixel_rays_of_view(&r->view);
+
     es_plan_begin_frame(&r->plan, s->skip);
     result = pass_visibility(r, &in);
     if (!result) result = pass_light_views(r, &in);
@@ -440,9 +444,13 @@ static es_result render(es_renderer* r, es_world* world)
     if (!result) result = pass_direct(r, &in);
     if (!result) result = es_pass_shading(r, &in);
     if (!result) result = es_pass_compensation(r, &in);
+    const bool first = s->temporal_stage == ES_TEMPORAL_BEFORE_FILTER;
+    if (!result && first) result = es_pass_temporal(r, &in);
     if (!result) result = es_pass_filter(r, &in);
+    if (!result && !first) result = es_pass_temporal(r, &in);
     if (!result) result = es_pass_upsample(r, &in);
     if (!result) pass_compose(r);
+    if (!result) es_history_end(&r->history);
     return result;
 }
 

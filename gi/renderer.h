@@ -5,6 +5,7 @@
 #include "gi/compose.h"
 #include "gi/filter.h"
 #include "gi/half_resolution.h"
+#include "gi/history.h"
 #include "gi/ism.h"
 #include "gi/light_view.h"
 #include "gi/plan.h"
@@ -13,9 +14,6 @@
 #include "gi/shade.h"
 #include "gi/vpl_sampling.h"
 #include "platform/context.h"
-
-/* Three planes of floats, rows of the G-buffer's stride. */
-typedef struct es_planes { float* at[3]; void* memory; size_t bytes; } es_planes;
 
 /* What the last frame was, or this one is being, rendered with: images are made of it after the settings have changed. */
 typedef struct es_frame_settings { es_renderer_settings settings; float extent; } es_frame_settings;
@@ -54,6 +52,7 @@ struct es_renderer {
     es_planes compensation;    /* of the lights' bias: reflected radiance, of either sign */
     bool has_specular;
     uint32_t filter_passes;    /* that this frame's indirect light went through */
+    es_history history;
     es_arena arena;            /* of the pass that runs */
     uint32_t* display;         /* 0x00RRGGBB */
     es_srgb_table srgb;
@@ -78,6 +77,15 @@ void es_planes_free(es_context* context, es_planes* planes);
 /* Passes of traced methods (gi/traced_passes.c). */
 es_result es_pass_hierarchy(es_renderer* renderer, const es_frame_inputs* in, es_world* world);
 es_result es_pass_compensation(es_renderer* renderer, const es_frame_inputs* in);
+/* What a frame takes from the last one (gi/temporal_passes.c). Begin: before the first pass; sets the view's previous matrices. */
+void es_history_begin(es_renderer* renderer, const es_frame_inputs* in, const es_world* world);
+void es_history_end(es_history* history); /* the frame is complete */
+void es_history_free(es_context* context, es_history* history);
+/* Before `drawn` is drawn anew: what it holds goes to `last`. */
+es_result es_history_keep(es_context* context, es_gbuffer* drawn, es_gbuffer* last);
+es_result es_pass_temporal(es_renderer* renderer, const es_frame_inputs* in);
+/* Of the last frame, a plane as the ones that are blended; 0 where there was no history. */
+es_result es_temporal_confidence(es_renderer* renderer, float* confidence);
 /* The job of the compose pass for the frame as it stands; outputs are for the caller to set. */
 es_compose_job es_renderer_compose_job(const es_renderer* renderer);
 

@@ -53,6 +53,23 @@ static const es_setting renderer_table[] = {
     {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
     {"half-resolution", ES_SETTING_BOOL, "false", 0, 1, NULL, "indirect light for one pixel of 2 × 2; the others are interpolated along their surface", AT(half_resolution)},
 
+    {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
+    {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},
+    {"temporal.base", ES_SETTING_FLOAT, "0.9", 0, 0.999, NULL, "confidence in last frame's light where nothing changes", AT(temporal_base)},
+    {"temporal.position", ES_SETTING_FLOAT, "1", 0, 1000, NULL, "how movement lowers the confidence, per share of the picture or of the scene's extent", AT(temporal_position)},
+    {"temporal.normal", ES_SETTING_FLOAT, "1", 0, 1000, NULL, "how a turned normal lowers the confidence, per 1 - cosine", AT(temporal_normal)},
+    {"temporal.illumination", ES_SETTING_FLOAT, "0.05", 0, 1000, NULL, "how changed light lowers the confidence, per cube of the difference as shown on white", AT(temporal_illumination)},
+    {"temporal.depth-threshold", ES_SETTING_FLOAT, "0.03", 0, 1, NULL, "another surface: largest relative difference of depth", AT(temporal_depth_threshold)},
+    {"temporal.normal-threshold", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "another surface: smallest dot product of normals", AT(temporal_normal_threshold)},
+    {"temporal.clamp", ES_SETTING_FLOAT, "0", 0, 10, NULL, "last frame's light is kept within its new neighbourhood's, widened by this share; 0: not", AT(temporal_clamp)},
+    {"temporal.reset-low", ES_SETTING_FLOAT, "0.2", 0, 10, NULL, "share by which a tile's light differs from its history's where the confidence begins to fall", AT(temporal_reset_low)},
+    {"temporal.reset-high", ES_SETTING_FLOAT, "0.5", 0, 10, NULL, "share from which on history is not used; 0: tiles are not compared", AT(temporal_reset_high)},
+    {"temporal.settle", ES_SETTING_INT, "64", 1, 100000, NULL, "frames without a change after which a picture is settled and nothing is left to do", AT(temporal_settle)},
+
+    {"antialias", ES_SETTING_CHOICE, "none", 0, 0, "none|temporal|supersample", "smooth edges: over frames by motion, or by several pictures each frame", AT(antialias)},
+    {"antialias.samples", ES_SETTING_INT, "16", 1, 64, NULL, "places inside a pixel that are sampled", AT(antialias_samples)},
+    {"antialias.blend", ES_SETTING_FLOAT, "0.1", 0.01, 1, NULL, "antialias temporal: share of the new frame where things move", AT(antialias_blend)},
+
     {"tone-map", ES_SETTING_CHOICE, "reinhard", 0, 0, "reinhard|pbr-neutral|linear", "display transform", AT(tone_map)},
     {"white", ES_SETTING_FLOAT, "4", 0.01, 100000, NULL, "Reinhard: radiance times exposure that is shown as white", AT(white)},
     {"exposure", ES_SETTING_FLOAT, "0", -20, 20, NULL, "stops", AT(exposure)},

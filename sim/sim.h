@@ -549,6 +549,7 @@ typedef struct es_world_revisions {
     uint64_t materials;   /* materials and textures */
     uint64_t lights;
     uint64_t camera;      /* active camera: which, its pose, its lens */
+    uint64_t steps;       /* up by one with each es_world_step, by two or more where what was last frame is not the frame before: es_world_restore */
     bool moving;          /* some previous transform, vertex or view differs from the present one */
 } es_world_revisions;
 ES_API es_world_revisions es_world_get_revisions(const es_world* world);

@@ -353,6 +353,7 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     io = (state_io){.mode = APPLY, .bytes = payload, .size = payload_size, .good = true};
     es_recording* recording = es_recording_pause(world); /* it is one input, not those it is made of */
     visit_world(world, &io);
+    world->revisions.steps += 2;
     es_world_refresh(world);
     es_recording_resume(world, recording);
     if (recording) es_note(world, &(es_input){.type = ES_INPUT_RESTORE, .state = {buffer, size}});

@@ -62,6 +62,7 @@ es_result es_world_step(es_world* world, float dt)
     if (!es_within(dt, 0, 10)) return es_fail(world->context, ES_INVALID_ARGUMENT, "es_world_step: dt is %g; it must lie in 0 … 10 seconds", (double)dt);
     es_world_settle(world);
     world->stepped = true;
+    world->revisions.steps++;
     double seconds = (double)dt * (double)world->settings.speed;
     es_result result = ES_OK;
     if (seconds > 0) {

@@ -1,0 +1,192 @@
+/* What a frame takes from the one before (gi/history.h), and the pass of temporal coherence. */
+#include <string.h>
+
+#include "gi/indirect.h"
+#include "gi/renderer.h"
+#include "platform/maths.h"
+#include "platform/random.h"
+
+/* ---- going on ----------------------------------------------------------------------------------------------------------- */
+
+/* Of all settings but what changes no result, or the display only. */
+static uint64_t settings_hash(const es_renderer_settings* settings)
+{
+    static const char* const others[] = {"skip", "exposure", "white", "tone-map"};
+    uint64_t hash = 0;
+    for (size_t i = 0; i < es_renderer_setting_count(); i++) {
+        const es_setting* setting = es_renderer_setting(i);
+        bool counts = true;
+        for (size_t k = 0; k < sizeof others / sizeof *others; k++) counts &= strcmp(setting->name, others[k]) != 0;
+        const char* value = (const char*)settings + setting->offset;
+        if (counts) hash = es_hash_bytes(hash, value, setting->type == ES_SETTING_BOOL ? sizeof(bool) : sizeof(uint32_t));
+    }
+    return hash;
+}
+
+/* Last frame's view, relative to this frame's origin. */
+static es_mat4 moved_view(es_mat4 view, const double from[3], const double to[3])
+{
+    float* m = view.m;
+    for (int row = 0; row < 3; row++) {
+        double t = (double)m[12 + row];
+        for (int k = 0; k < 3; k++) t += (double)m[4 * k + row] * (to[k] - from[k]);
+        m[12 + row] = (float)t;
+    }
+    return view;
+}
+
+static bool same_view(const es_raster_view* a, const es_mat4* view, const es_mat4* projection)
+{
+    return memcmp(&a->view, view, sizeof *view) == 0 && memcmp(&a->projection, projection, sizeof *projection) == 0;
+}
+
+void es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_world* world)
+{
+    es_history* h = &r->history;
+    const es_renderer_settings* s = &r->settings;
+    const bool goes_on = h->complete;
+    h->complete = h->continuous = h->settled = false;
+    h->moving = true;
+    h->job.gbuffer = NULL;
+    h->wanted = s->temporal;
+    if (!h->wanted) {
+        es_history_free(r->context, h);
+        return;
+    }
+    double origin[3];
+    es_world_origin(world, origin);
+    const uint32_t camera = es_world_active_camera(world).id;
+    const uint64_t settings = settings_hash(s);
+    const es_world_revisions* now = &in->revisions;
+    const uint64_t steps = now->steps - h->revisions.steps;
+    const es_mat4 last_view = moved_view(h->view.view, h->origin, origin), last_projection = h->view.projection;
+    const bool turned = !same_view(&r->view, &last_view, &last_projection), carried = now->moving && steps == 1;
+    h->continuous = goes_on && camera == h->camera && settings == h->settings && (steps == 1 || (steps == 0 && now->geometry == h->revisions.geometry && !(now->moving && turned)));
+    h->moving = turned || carried;
+
+    uint64_t content = es_hash_bytes(settings, &r->view.view, sizeof r->view.view);
+    content = es_hash_bytes(content, &r->view.projection, sizeof r->view.projection);
+    const uint64_t words[] = {now->geometry, now->materials, now->lights};
+    content = es_hash_bytes(content, words, sizeof words);
+    content = es_hash_bytes(content, &s->exposure, sizeof s->exposure);
+    h->still = h->continuous && !h->moving && content == h->content ? h->still + (h->still < UINT32_MAX) : 0;
+    h->settled = h->still >= s->temporal_settle;
+    if (!h->continuous) h->planes = 0;
+
+    r->view.previous_view = h->continuous ? last_view : r->view.view;
+    r->view.previous_projection = h->continuous ? last_projection : r->view.projection;
+    h->view = r->view;
+    memcpy(h->origin, origin, sizeof origin);
+    h->revisions = *now;
+    h->camera = camera;
+    h->settings = settings;
+    h->content = content;
+}
+
+void es_history_end(es_history* h) { h->complete = h->wanted; }
+
+void es_history_free(es_context* context, es_history* h)
+{
+    es_gbuffer_destroy(context, &h->gbuffer);
+    es_gbuffer_destroy(context, &h->half);
+    for (int i = 0; i < 2; i++) {
+        es_planes_free(context, &h->irradiance[i]);
+        es_planes_free(context, &h->specular[i]);
+    }
+    h->planes = 0;
+    h->complete = false;
+    h->job.gbuffer = NULL;
+}
+
+es_result es_history_keep(es_context* context, es_gbuffer* drawn, es_gbuffer* last)
+{
+    if (last->width != drawn->width || last->height != drawn->height || last->planes != drawn->planes || !last->memory) {
+        es_gbuffer_destroy(context, last);
+        es_result result = es_gbuffer_create(context, drawn->width, drawn->height, drawn->planes, last);
+        if (result) return result;
+    }
+    es_gbuffer other = *last;
+    *last = *drawn;
+    *drawn = other;
+    return ES_OK;
+}
+
+/* ---- the pass --------------------------------------------------------------------------------------------------------------- */
+
+static es_result blend(es_renderer* r, const es_frame_inputs* in)
+{
+    const es_gbuffer* shaded = es_indirect_gbuffer(r);
+    const es_planes *irradiance, *specular;
+    es_indirect_unblended(r, &irradiance, &specular);
+    es_history* h = &r->history;
+    const es_renderer_settings* s = &r->settings;
+    const uint32_t from = h->current, to = 1 - from;
+    es_result result = es_planes_resize(r->context, &h->irradiance[to], shaded);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, &h->specular[to], shaded);
+    if (result) return result;
+    const bool redrawn = !r->plan.stats[ES_PASS_VISIBILITY].skipped, half = s->half_resolution;
+    es_temporal_job job = {.gbuffer = shaded, .previous = redrawn ? half ? &h->half : &h->gbuffer : shaded, .moving = h->moving, .plane_count = r->has_specular ? 6 : 3,
+        .base = s->temporal_base, .position = s->temporal_position, .normal = s->temporal_normal, .illumination = s->temporal_illumination, .extent = in->extent, .exposure_scale = es_exp2(s->exposure),
+        .depth_threshold = s->temporal_depth_threshold, .normal_threshold = s->temporal_normal_threshold, .clamp = s->temporal_clamp, .reset_low = s->temporal_reset_low, .reset_high = s->temporal_reset_high};
+    job.history_count = h->settled ? 0 : h->planes < job.plane_count ? h->planes : job.plane_count;
+    const es_raster_view now = r->view;
+    es_raster_view then = now;
+    then.view = now.previous_view;
+    es_temporal_depth_then(&now, &then, half ? 2 : 1, job.depth_then);
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = irradiance->at[k];
+        job.history[k] = h->irradiance[from].at[k];
+        job.result[k] = h->irradiance[to].at[k];
+        job.source[k + 3] = specular->at[k];
+        job.history[k + 3] = h->specular[from].at[k];
+        job.result[k + 3] = h->specular[to].at[k];
+    }
+    es_arena_reset(&r->arena);
+    result = es_temporal_compare(r->context, &r->arena, &job);
+    if (result) return result;
+    es_temporal_blend(r->context, &job);
+    h->current = to;
+    h->planes = job.plane_count;
+    h->job = job;
+    h->job.reset = NULL;
+    return ES_OK;
+}
+
+es_result es_pass_temporal(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->temporal ? "temporal is off" : NULL;
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_TEMPORAL, why);
+        r->history.planes = 0;
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_TEMPORAL);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    if (s->temporal_stage == ES_TEMPORAL_AFTER_FILTER) es_plan_reads_pass(plan, ES_PASS_FILTER);
+    /* until it is settled, each frame's result is another */
+    const uint64_t frame = r->history.settled ? 0 : r->frames + 1;
+    es_plan_reads(plan, &frame, sizeof frame);
+    if (!es_plan_run(plan, ES_PASS_TEMPORAL)) return ES_OK;
+    es_result result = blend(r, in);
+    const es_gbuffer* shaded = es_indirect_gbuffer(r);
+    if (!result) es_plan_done(plan, ES_PASS_TEMPORAL, (uint64_t)shaded->width * shaded->height);
+    return result;
+}
+
+es_result es_temporal_confidence(es_renderer* r, float* confidence)
+{
+    es_temporal_job job = r->history.job;
+    if (!job.gbuffer) {
+        memset(confidence, 0, (size_t)r->gbuffer.stride * r->gbuffer.height * sizeof *confidence);
+        return ES_OK;
+    }
+    memset(job.result, 0, sizeof job.result);
+    job.confidence = confidence;
+    es_arena_reset(&r->arena);
+    es_result result = es_temporal_compare(r->context, &r->arena, &job);
+    if (!result) es_temporal_blend(r->context, &job);
+    return result;
+}
