@@ -23,6 +23,9 @@ typedef struct es_history {
     es_world_revisions revisions;
     uint32_t camera;
     uint64_t settings;         /* hash of those that a history is made with */
+    es_light_state* lights;    /* of the last frame, relative to its origin */
+    size_t light_count, light_capacity;
+    float alert;               /* 0 … 1: how suddenly the lights changed of late */
     uint64_t content;          /* hash of all that the last frame was made from */
 
     /* of this frame, once es_history_begin has been called */

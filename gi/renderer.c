@@ -432,7 +432,8 @@ static es_result render(es_renderer* r, es_world* world)
     in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
 
     r->frame = (es_frame_settings){*s, in.extent};
-    es_history_begin(r, &in, world);
+    result = es_history_begin(r, &in, world);
+    if (result) return result;
     r->rays = es_pixel_rays_of_view(&r->view);
 
     es_plan_begin_frame(&r->plan, s->skip);

@@ -78,7 +78,7 @@ void es_planes_free(es_context* context, es_planes* planes);
 es_result es_pass_hierarchy(es_renderer* renderer, const es_frame_inputs* in, es_world* world);
 es_result es_pass_compensation(es_renderer* renderer, const es_frame_inputs* in);
 /* What a frame takes from the last one (gi/temporal_passes.c). Begin: before the first pass; sets the view's previous matrices. */
-void es_history_begin(es_renderer* renderer, const es_frame_inputs* in, const es_world* world);
+es_result es_history_begin(es_renderer* renderer, const es_frame_inputs* in, const es_world* world);
 void es_history_end(es_history* history); /* the frame is complete */
 void es_history_free(es_context* context, es_history* history);
 /* Before `drawn` is drawn anew: what it holds goes to `last`. */

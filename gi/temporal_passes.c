@@ -27,6 +27,7 @@ static uint64_t settings_hash(const es_renderer_settings* settings)
 static es_mat4 moved_view(es_mat4 view, const double from[3], const double to[3])
 {
     float* m = view.m;
+    if (memcmp(from, to, 3 * sizeof *from) == 0) return view;
     for (int row = 0; row < 3; row++) {
         double t = (double)m[12 + row];
         for (int k = 0; k < 3; k++) t += (double)m[4 * k + row] * (to[k] - from[k]);
@@ -40,7 +41,43 @@ static bool same_view(const es_raster_view* a, const es_mat4* view, const es_mat
     return memcmp(&a->view, view, sizeof *view) == 0 && memcmp(&a->projection, projection, sizeof *projection) == 0;
 }
 
-void es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_world* world)
+/* How suddenly lights changed: 1 where one came or went, doubled its light, or moved by a tenth of the scene's extent or 25 degrees. */
+static float light_change(const es_history* h, const es_frame_inputs* in, const double origin[3])
+{
+    if (h->light_count != in->light_count) return 1.0f;
+    const es_vec3 shift = es_v3((float)(h->origin[0] - origin[0]), (float)(h->origin[1] - origin[1]), (float)(h->origin[2] - origin[2]));
+    float most = 0.0f;
+    for (uint32_t i = 0; i < in->light_count; i++) {
+        const es_light_state *a = &h->lights[i], *b = &in->lights[i];
+        if (a->handle.id != b->handle.id || a->type != b->type) return 1.0f;
+        float difference = 0.0f, larger = 1e-30f;
+        for (int k = 0; k < 3; k++) {
+            difference += es_absf(a->radiant[k] - b->radiant[k]);
+            larger += es_maxf(a->radiant[k], b->radiant[k]);
+        }
+        const float moved = a->type == ES_LIGHT_DIRECTIONAL ? 0.0f : es_v3_length(es_v3_sub(es_v3_add(a->position, shift), b->position)) / in->extent;
+        const float turned = a->type == ES_LIGHT_POINT ? 0.0f : 1.0f - es_v3_dot(a->direction, b->direction);
+        const float opened = a->type == ES_LIGHT_SPOT ? es_maxf(es_absf(a->cos_inner - b->cos_inner), es_absf(a->cos_outer - b->cos_outer)) : 0.0f;
+        most = es_maxf(most, es_maxf(es_maxf(2.0f * difference / larger, 10.0f * moved), 10.0f * es_maxf(turned, opened)));
+    }
+    return es_minf(most, 1.0f);
+}
+
+static es_result keep_lights(es_context* context, es_history* h, const es_frame_inputs* in)
+{
+    if (in->light_count > h->light_capacity) {
+        es_release(context, h->lights, h->light_capacity * sizeof *h->lights);
+        h->light_capacity = 0;
+        h->lights = es_allocate_array(context, in->light_count, sizeof *h->lights);
+        if (!h->lights) return es_context_last_result(context);
+        h->light_capacity = in->light_count;
+    }
+    if (in->light_count) memcpy(h->lights, in->lights, in->light_count * sizeof *h->lights);
+    h->light_count = in->light_count;
+    return ES_OK;
+}
+
+es_result es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_world* world)
 {
     es_history* h = &r->history;
     const es_renderer_settings* s = &r->settings;
@@ -51,7 +88,7 @@ void es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_world*
     h->wanted = s->temporal;
     if (!h->wanted) {
         es_history_free(r->context, h);
-        return;
+        return ES_OK;
     }
     double origin[3];
     es_world_origin(world, origin);
@@ -72,6 +109,7 @@ void es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_world*
     h->still = h->continuous && !h->moving && content == h->content ? h->still + (h->still < UINT32_MAX) : 0;
     h->settled = h->still >= s->temporal_settle;
     if (!h->continuous) h->planes = 0;
+    h->alert = h->continuous ? es_maxf(light_change(h, in, origin), h->alert > 0.01f ? 0.5f * h->alert : 0.0f) : 0.0f;
 
     r->view.previous_view = h->continuous ? last_view : r->view.view;
     r->view.previous_projection = h->continuous ? last_projection : r->view.projection;
@@ -81,6 +119,7 @@ void es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_world*
     h->camera = camera;
     h->settings = settings;
     h->content = content;
+    return keep_lights(r->context, h, in);
 }
 
 void es_history_end(es_history* h) { h->complete = h->wanted; }
@@ -93,6 +132,9 @@ void es_history_free(es_context* context, es_history* h)
         es_planes_free(context, &h->irradiance[i]);
         es_planes_free(context, &h->specular[i]);
     }
+    es_release(context, h->lights, h->light_capacity * sizeof *h->lights);
+    h->lights = NULL;
+    h->light_count = h->light_capacity = 0;
     h->planes = 0;
     h->complete = false;
     h->job.gbuffer = NULL;
@@ -127,7 +169,9 @@ static es_result blend(es_renderer* r, const es_frame_inputs* in)
     const bool redrawn = !r->plan.stats[ES_PASS_VISIBILITY].skipped, half = s->half_resolution;
     es_temporal_job job = {.gbuffer = shaded, .previous = redrawn ? half ? &h->half : &h->gbuffer : shaded, .moving = h->moving, .plane_count = r->has_specular ? 6 : 3,
         .base = s->temporal_base, .position = s->temporal_position, .normal = s->temporal_normal, .illumination = s->temporal_illumination, .extent = in->extent, .exposure_scale = es_exp2(s->exposure),
-        .depth_threshold = s->temporal_depth_threshold, .normal_threshold = s->temporal_normal_threshold, .clamp = s->temporal_clamp, .reset_low = s->temporal_reset_low, .reset_high = s->temporal_reset_high};
+        .depth_threshold = s->temporal_depth_threshold, .normal_threshold = s->temporal_normal_threshold, .clamp = s->temporal_clamp};
+    job.reset_low = s->temporal_reset_low * (1.0f - 0.9f * h->alert);
+    job.reset_high = s->temporal_reset_high * (1.0f - 0.8f * h->alert);
     job.history_count = h->settled ? 0 : h->planes < job.plane_count ? h->planes : job.plane_count;
     const es_raster_view now = r->view;
     es_raster_view then = now;

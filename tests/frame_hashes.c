@@ -7,6 +7,7 @@
  *
  * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
  * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps;
+ * `half-temporal` and `temporal` blend light with that of the frame before;
  * `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
@@ -362,6 +363,20 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     settings.half_resolution = true;
     check(context, es_renderer_configure(renderer, &settings), "halving the resolution");
     print_images(context, renderer, world, p->name, "half", folder);
+    settings.temporal = true;
+    check(context, es_renderer_configure(renderer, &settings), "keeping history");
+    check(context, es_renderer_render(renderer, world), "rendering");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "half-temporal", folder);
+    settings.half_resolution = false;
+    settings.method = ES_GI_ISM;
+    settings.vpls = p->vpls / 2;
+    settings.near_distance = 0;
+    settings.temporal_clamp = 0.5f;
+    check(context, es_renderer_configure(renderer, &settings), "keeping history");
+    check(context, es_renderer_render(renderer, world), "rendering");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "temporal", folder);
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);
