@@ -66,6 +66,7 @@ static void face_views(es_light_view* view, uint32_t size, es_vec3 low, es_vec3 
 
 es_result es_light_view_prepare(es_context* context, es_light_view* view, const es_light_state* light, es_light_view_sizes sizes, es_vec3 low, es_vec3 high)
 {
+    const uint32_t planes = LIGHT_PLANES | (sizes.ids ? ES_GBUFFER_INSTANCE | ES_GBUFFER_TRIANGLE : 0);
     view->light = *light;
     view->orthographic = light->type == ES_LIGHT_DIRECTIONAL;
     bool cube = light->type == ES_LIGHT_POINT || (light->type == ES_LIGHT_SPOT && light->cos_outer < es_cos(ES_SPOT_VIEW_MAX_ANGLE));
@@ -80,7 +81,7 @@ es_result es_light_view_prepare(es_context* context, es_light_view* view, const 
             es_release(context, face->shadow_depth, old_bytes);
             face->shadow_depth = NULL;
         }
-        if (face->gbuffer.memory && (!wanted || !sizes.gbuffers || face->gbuffer.width != sizes.light_size))
+        if (face->gbuffer.memory && (!wanted || !sizes.gbuffers || face->gbuffer.width != sizes.light_size || face->gbuffer.planes != planes))
             es_gbuffer_destroy(context, &face->gbuffer);
         if (!wanted) continue;
         if (!face->shadow_depth) {
@@ -89,7 +90,7 @@ es_result es_light_view_prepare(es_context* context, es_light_view* view, const 
             face->shadow_view.width = sizes.shadow_size;
         }
         if (sizes.gbuffers && !face->gbuffer.memory) {
-            es_result result = es_gbuffer_create(context, sizes.light_size, sizes.light_size, LIGHT_PLANES, &face->gbuffer);
+            es_result result = es_gbuffer_create(context, sizes.light_size, sizes.light_size, planes, &face->gbuffer);
             if (result) return result;
         }
     }

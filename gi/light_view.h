@@ -15,7 +15,7 @@ typedef struct es_light_face {
     float* shadow_depth;           /* reversed depth, shadow_size rows of shadow_size */
     es_raster_view gbuffer_view;   /* light_size² */
     es_pixel_rays gbuffer_rays;
-    es_gbuffer gbuffer;            /* depth, normal, albedo, surface */
+    es_gbuffer gbuffer;            /* depth, normal, albedo, surface; with `ids` instance and triangle */
 } es_light_face;
 
 typedef struct es_light_view {
@@ -28,7 +28,7 @@ typedef struct es_light_view {
     float power;                   /* emitted, luminance-weighted, W; the share of virtual point lights follows it */
 } es_light_view;
 
-typedef struct es_light_view_sizes { uint32_t shadow_size, light_size; bool gbuffers; } es_light_view_sizes;
+typedef struct es_light_view_sizes { uint32_t shadow_size, light_size; bool gbuffers, ids; } es_light_view_sizes;
 
 /* Sets type, matrices and buffers for one light of a world with the given bounds; buffers are reallocated when sizes or the
  * number of faces change. */

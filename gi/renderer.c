@@ -8,6 +8,7 @@
 #include "gi/indirect.h"
 #include "platform/context.h"
 #include "platform/maths.h"
+#include "platform/random.h"
 #include "platform/settings.h"
 
 /* ---- planes ------------------------------------------------------------------------------------------------------------ */
@@ -103,6 +104,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_release(context, renderer->importances, renderer->light_capacity * sizeof *renderer->importances);
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
     es_scene_points_free(context, &renderer->points);
+    es_stable_vpls_free(context, &renderer->stable);
     es_ism_maps_free(context, &renderer->maps);
     es_trace_scene_free(&renderer->trace_scene);
     es_arena_free(&renderer->arena);
@@ -211,7 +213,7 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
     }
     es_result result = reserve_lights(r, in->light_count);
     if (result) return result;
-    es_light_view_sizes sizes = {r->settings.shadow_size, r->settings.light_size, in->no_indirect == NULL};
+    es_light_view_sizes sizes = {r->settings.shadow_size, r->settings.light_size, in->no_indirect == NULL, r->settings.stable_vpls};
     for (uint32_t i = 0; i < in->light_count && !result; i++) result = es_light_view_prepare(r->context, &r->light_views[i], &in->lights[i], sizes, in->bounds_min, in->bounds_max);
     if (result) return result;
 
@@ -234,7 +236,8 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
         return ES_OK;
     }
     es_plan_begin(plan, ES_PASS_LIGHT_VIEWS);
-    es_plan_reads(plan, &r->settings.light_size, sizeof r->settings.light_size);
+    uint32_t words[] = {r->settings.light_size, r->settings.stable_vpls};
+    es_plan_reads(plan, words, sizeof words);
     reads_light_poses(plan, in);
     if (es_plan_run(plan, ES_PASS_LIGHT_VIEWS)) {
         uint64_t triangles = 0;
@@ -246,6 +249,13 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
         if (!result) es_plan_done(plan, ES_PASS_LIGHT_VIEWS, triangles);
     }
     return result;
+}
+
+/* Of what the lights see. */
+static uint64_t scene_hash(const es_frame_inputs* in)
+{
+    uint64_t hash = es_hash_bytes(in->revisions.materials, &in->revisions.geometry, sizeof in->revisions.geometry);
+    return es_hash_bytes(hash, in->lights, in->light_count * sizeof *in->lights);
 }
 
 static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
@@ -260,22 +270,31 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_VPLS);
     es_plan_reads_pass(plan, ES_PASS_LIGHT_VIEWS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
-    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy, r->settings.view_importance};
+    const bool stable = r->settings.stable_vpls, by_view = r->settings.view_importance && !stable;
+    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy, by_view, stable};
     es_plan_reads(plan, words, sizeof words);
-    if (r->settings.view_importance) es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    if (by_view) es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads(plan, &r->settings.renew, sizeof r->settings.renew);
+    /* until they have settled, stable lights go on from what they were */
+    uint64_t unsettled = stable && !r->stable.settled ? r->frames + 1 : 0;
+    es_plan_reads(plan, &unsettled, sizeof unsettled);
     if (!es_plan_run(plan, ES_PASS_VPLS)) return ES_OK;
     es_result result = reserve_vpls(r, request.count);
     es_arena_reset(&r->arena);
-    es_receivers* receivers = r->settings.view_importance && !result ? es_arena_allocate(&r->arena, sizeof *receivers) : NULL;
+    es_receivers* receivers = by_view && !result ? es_arena_allocate(&r->arena, sizeof *receivers) : NULL;
     if (receivers) {
         /* about the squared distance between the grid's pixels on surfaces half the scene away */
         float softening = in->extent * 0.004f;
         es_receivers_collect(receivers, &r->gbuffer, &r->rays, softening * softening);
-    } else if (r->settings.view_importance && !result) {
+    } else if (by_view && !result) {
         result = es_context_last_result(r->context);
     }
     for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i], receivers);
-    if (!result) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->vpl_count);
+    if (!result && stable) {
+        es_stable_vpl_request of_stable = {request, r->settings.renew, in->list, scene_hash(in), in->revisions.materials};
+        result = es_stable_vpls_update(r->context, &r->stable, r->light_views, r->light_count, r->importances, &of_stable, r->vpls, &r->vpl_count);
+    } else if (!result) es_stable_vpls_free(r->context, &r->stable);
+    if (!result && !stable) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->vpl_count);
     if (!result) es_plan_done(plan, ES_PASS_VPLS, r->vpl_count);
     return result;
 }

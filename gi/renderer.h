@@ -12,6 +12,7 @@
 #include "gi/reference/scene.h"
 #include "gi/scene_points.h"
 #include "gi/shade.h"
+#include "gi/stable_vpls.h"
 #include "gi/vpl_sampling.h"
 #include "platform/context.h"
 
@@ -38,6 +39,7 @@ struct es_renderer {
 
     es_vpl_record* vpls;
     uint32_t vpl_count, vpl_capacity;
+    es_stable_vpls stable;     /* places of the lights, with vpl.stable: the only thing that frames leave to later ones but what they need not compute again */
 
     es_scene_points points;
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */

@@ -13,25 +13,35 @@ static es_surface surface_at(const es_gbuffer* gbuffer, size_t at) { return es_s
 
 /* Power that a face's texel receives per unit of the light's intensity: solid angle (perspective, sr) or area (orthographic, m²),
  * times the falloff. A perspective texel at tangent coordinates (a, b) spans step² / (1 + a² + b²)^(3/2). */
-static float texel_share(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float depth)
+float es_light_texel_share(const es_light_view* view, const es_light_face* face, float x, float y, float depth)
 {
     const es_pixel_rays* rays = &face->gbuffer_rays;
     if (view->orthographic) {
         es_vec3 dx = es_v3(rays->base_dx[0], rays->base_dx[1], rays->base_dx[2]), dy = es_v3(rays->base_dy[0], rays->base_dy[1], rays->base_dy[2]);
         return es_v3_length(dx) * es_v3_length(dy);
     }
-    es_vec3 d = es_pixel_rays_direction(rays, (float)x, (float)y);
+    es_vec3 d = es_pixel_rays_direction(rays, x, y);
     es_vec3 dx = es_v3(rays->dir_dx[0], rays->dir_dx[1], rays->dir_dx[2]), dy = es_v3(rays->dir_dy[0], rays->dir_dy[1], rays->dir_dy[2]);
     float length = es_v3_length(d);
     float solid_angle = es_sqrt(es_v3_dot(dx, dx) * es_v3_dot(dy, dy)) / (length * length * length);
     return solid_angle * es_light_falloff(&view->light, es_v3_scale(d, 1.0f / length), depth * length);
 }
 
+float es_importance_of(const es_light_view* view, const es_surface* surface, float share)
+{
+    const es_vec3 light = es_v3(view->light.radiant[0], view->light.radiant[1], view->light.radiant[2]);
+    if (surface->model == ES_SURFACE_UNLIT) return 0.0f;
+    /* eq. 4.3; SP runs from 0 (diffuse) to 1 (mirror-like): the exponent / 50, or 1 - roughness, by the lobe's weight */
+    const float gloss = (surface->model == ES_SURFACE_PHONG ? surface->roughness * 0.02f : 1.0f - surface->roughness) * luminance(surface->specular);
+    const float reflected = luminance(es_v3_mul(es_v3_add(surface->albedo, surface->specular), light));
+    return share * reflected * (0.5f + gloss);
+}
+
 /* Surface that a texel covers, m²: solid angle times distance² (perspective), cross-section (orthographic), over the cosine. */
-static float texel_area(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float depth, es_vec3 normal)
+float es_light_texel_area(const es_light_view* view, const es_light_face* face, float x, float y, float depth, es_vec3 normal)
 {
     const es_pixel_rays* rays = &face->gbuffer_rays;
-    es_vec3 d = es_pixel_rays_direction(rays, (float)x, (float)y);
+    es_vec3 d = es_pixel_rays_direction(rays, x, y);
     float length = es_v3_length(d), cosine = es_maxf(es_absf(es_v3_dot(d, normal)) / length, 0.05f);
     const float* sx = view->orthographic ? rays->base_dx : rays->dir_dx;
     const float* sy = view->orthographic ? rays->base_dy : rays->dir_dy;
@@ -45,7 +55,6 @@ static void importance_rows(void* user, uint32_t begin, uint32_t end, uint32_t w
 {
     importance_job* job = user;
     uint32_t size = job->importance->size;
-    es_vec3 light = es_v3(job->view->light.radiant[0], job->view->light.radiant[1], job->view->light.radiant[2]);
     for (uint32_t row = begin; row < end; row++) {
         uint32_t f = row / size, y = row % size;
         const es_light_face* face = &job->view->faces[f];
@@ -55,12 +64,7 @@ static void importance_rows(void* user, uint32_t begin, uint32_t end, uint32_t w
             float depth = face->gbuffer.depth[at], value = 0.0f;
             if (depth > 0.0f) {
                 es_surface surface = surface_at(&face->gbuffer, at);
-                if (surface.model != ES_SURFACE_UNLIT) {
-                    /* eq. 4.3; SP runs from 0 (diffuse) to 1 (mirror-like): the exponent / 50, or 1 - roughness, by the lobe's weight */
-                    float gloss = (surface.model == ES_SURFACE_PHONG ? surface.roughness * 0.02f : 1.0f - surface.roughness) * luminance(surface.specular);
-                    float reflected = luminance(es_v3_mul(es_v3_add(surface.albedo, surface.specular), light));
-                    value = texel_share(job->view, face, x, y, depth) * reflected * (0.5f + gloss);
-                }
+                if (surface.model != ES_SURFACE_UNLIT) value = es_importance_of(job->view, &surface, es_light_texel_share(job->view, face, (float)x, (float)y, depth));
             }
             out[x] = value;
         }
@@ -259,33 +263,38 @@ bool es_importance_warp(const es_importance* importance, float u, float v, uint3
     return *probability > 0.0f;
 }
 
+void es_vpl_make(const es_light_view* view, const es_vpl_place* place, const es_surface* surface, bool glossy, es_vpl_record* record)
+{
+    es_vec3 tangent, bitangent;
+    es_orthonormal_basis(place->normal, &tangent, &bitangent);
+    es_vec3 power = es_v3_scale(es_v3(view->light.radiant[0], view->light.radiant[1], view->light.radiant[2]), place->share);
+    es_vec3 flux = es_v3_mul(power, surface->albedo);
+    *record = (es_vpl_record){
+        .position = {place->position.x, place->position.y, place->position.z},
+        .normal = {place->normal.x, place->normal.y, place->normal.z},
+        .tangent = {tangent.x, tangent.y, tangent.z},
+        .bitangent = {bitangent.x, bitangent.y, bitangent.z},
+        .flux = {flux.x, flux.y, flux.z},
+        .power = {power.x, power.y, power.z},
+        .incident = {place->incident.x, place->incident.y, place->incident.z},
+        .specular_color = {surface->specular.x, surface->specular.y, surface->specular.z},
+        .area = place->area,
+        .roughness = surface->roughness,
+        .model = surface->model,
+        .glossy = glossy && es_surface_has_lobe(surface),
+    };
+}
+
 static void make_record(const es_light_view* view, const es_light_face* face, uint32_t x, uint32_t y, float weight, bool glossy, es_vpl_record* record)
 {
     const es_gbuffer* gbuffer = &face->gbuffer;
     size_t at = (size_t)y * gbuffer->stride + x;
     float depth = gbuffer->depth[at];
-    es_vec3 position = es_pixel_rays_position(&face->gbuffer_rays, (float)x, (float)y, depth);
-    es_vec3 normal = es_unpack_normal(gbuffer->normal[at]), tangent, bitangent;
-    es_orthonormal_basis(normal, &tangent, &bitangent);
+    es_vec3 position = es_pixel_rays_position(&face->gbuffer_rays, (float)x, (float)y, depth), normal = es_unpack_normal(gbuffer->normal[at]);
     es_vec3 incident = view->orthographic ? es_v3_scale(view->light.direction, -1.0f) : es_v3_normalize(es_v3_sub(view->light.position, position), normal);
     es_surface surface = surface_at(gbuffer, at);
-    float share = texel_share(view, face, x, y, depth) * weight;
-    es_vec3 power = es_v3_scale(es_v3(view->light.radiant[0], view->light.radiant[1], view->light.radiant[2]), share);
-    es_vec3 flux = es_v3_mul(power, surface.albedo);
-    *record = (es_vpl_record){
-        .position = {position.x, position.y, position.z},
-        .normal = {normal.x, normal.y, normal.z},
-        .tangent = {tangent.x, tangent.y, tangent.z},
-        .bitangent = {bitangent.x, bitangent.y, bitangent.z},
-        .flux = {flux.x, flux.y, flux.z},
-        .power = {power.x, power.y, power.z},
-        .incident = {incident.x, incident.y, incident.z},
-        .specular_color = {surface.specular.x, surface.specular.y, surface.specular.z},
-        .area = texel_area(view, face, x, y, depth, normal) * weight,
-        .roughness = surface.roughness,
-        .model = surface.model,
-        .glossy = glossy && es_surface_has_lobe(&surface),
-    };
+    es_vpl_place place = {position, normal, incident, es_light_texel_share(view, face, (float)x, (float)y, depth) * weight, es_light_texel_area(view, face, (float)x, (float)y, depth, normal) * weight};
+    es_vpl_make(view, &place, &surface, glossy, record);
 }
 
 /* VPLs of each light by emitted power: rounded down, the remainder to the lights in order. */
@@ -303,7 +312,7 @@ static void share_out(const es_light_view* views, uint32_t view_count, uint32_t 
         else given--;
 }
 
-static float total_importance(const es_importance* importance)
+float es_importance_total(const es_importance* importance)
 {
     float total = 0.0f;
     for (uint32_t f = 0; f < importance->face_count; f++) total += importance->sums[f * importance->face_floats + importance->level_offset[importance->level_count - 1]];
@@ -314,11 +323,10 @@ void es_vpl_shares(const es_light_view* views, uint32_t view_count, const es_imp
 {
     share_out(views, view_count, count, shares);
     for (uint32_t i = 0; i < view_count; i++)
-        if (!(total_importance(&importances[i]) > 0.0f)) shares[i] = 0; /* lights nothing */
+        if (!(es_importance_total(&importances[i]) > 0.0f)) shares[i] = 0; /* lights nothing */
 }
 
-/* Pixel coordinates and depth of a point; false when it lies outside the face. */
-static bool texel_of(const es_light_view* view, const es_light_face* face, es_vec3 position, uint32_t* x, uint32_t* y, float* depth)
+bool es_light_texel_of(const es_light_view* view, const es_light_face* face, es_vec3 position, float* x, float* y, float* depth)
 {
     const es_pixel_rays* r = &face->gbuffer_rays;
     es_vec3 v = es_v3_sub(position, es_v3(r->base[0], r->base[1], r->base[2])), d = es_v3(r->dir[0], r->dir[1], r->dir[2]);
@@ -331,19 +339,20 @@ static bool texel_of(const es_light_view* view, const es_light_face* face, es_ve
     float u = es_v3_dot(q, dx) / es_v3_dot(dx, dx) + 0.5f, w = es_v3_dot(q, dy) / es_v3_dot(dy, dy) + 0.5f;
     float size = (float)face->gbuffer.width;
     if (!(u >= 0.0f && u < size && w >= 0.0f && w < size)) return false;
-    *x = (uint32_t)u;
-    *y = (uint32_t)w;
+    *x = u - 0.5f;
+    *y = w - 0.5f;
     return true;
 }
 
 float es_vpl_area_at(const es_light_view* view, const es_importance* importance, uint32_t share, es_vec3 position, es_vec3 normal)
 {
-    uint32_t f = 0, x = 0, y = 0;
-    float depth = 0.0f, total = total_importance(importance);
-    while (f < view->face_count && !texel_of(view, &view->faces[f], position, &x, &y, &depth)) f++;
+    uint32_t f = 0;
+    float depth = 0.0f, fx = 0.0f, fy = 0.0f, total = es_importance_total(importance);
+    while (f < view->face_count && !es_light_texel_of(view, &view->faces[f], position, &fx, &fy, &depth)) f++;
     if (f == view->face_count || !share || !(total > 0.0f)) return __builtin_inff();
-    float probability = importance->sums[f * importance->face_floats + (size_t)y * importance->size + x] / total;
-    return probability > 1e-20f ? texel_area(view, &view->faces[f], x, y, depth, normal) / (probability * (float)share) : __builtin_inff();
+    const uint32_t x = (uint32_t)(fx + 0.5f), y = (uint32_t)(fy + 0.5f), last = importance->size - 1; /* rounding may lead past it */
+    float probability = importance->sums[f * importance->face_floats + (size_t)(y < last ? y : last) * importance->size + (x < last ? x : last)] / total;
+    return probability > 1e-20f ? es_light_texel_area(view, &view->faces[f], (float)x, (float)y, depth, normal) / (probability * (float)share) : __builtin_inff();
 }
 
 es_result es_vpls_sample(es_context* context, const es_light_view* views, uint32_t view_count, const es_importance* importances, const es_vpl_request* request,
