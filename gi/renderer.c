@@ -366,9 +366,10 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_ISM)) return ES_OK;
     es_ism_job job = {.vpls = r->vpls, .vpl_count = r->vpl_count, .points = &r->points, .size = s->ism_size, .far_distance = in->extent, .near_distance = near_distance(in),
-        .pull_push = s->pull_push, .pull_threshold = s->pull_threshold, .push_threshold = s->push_threshold, .pull_push_levels = s->pull_push_levels};
+        .pull_push = s->pull_push, .pull_threshold = s->pull_threshold, .push_threshold = s->push_threshold, .pull_push_levels = s->pull_push_levels, .keep = s->skip, .kept_bytes = (size_t)s->ism_kept << 20};
     es_result result = es_ism_maps_build(r->context, &r->maps, &job);
-    if (!result) es_plan_done(plan, ES_PASS_ISM, (uint64_t)r->vpl_count * s->ism_points);
+    if (!result) es_plan_done(plan, ES_PASS_ISM, r->maps.kept.splats);
+    if (!result && !r->maps.kept.splats && r->maps.kept.stood) plan->stats[ES_PASS_ISM].skipped = "neither a light nor a point moved";
     return result;
 }
 

@@ -13,7 +13,7 @@ static int64_t folded(int64_t i, int64_t count, int64_t n)
 }
 
 /* Column x, outside the image, of a line whose taps are [begin, end) */
-static void fold(const es_filter_job* job, es_filter_scratch* s, int64_t x, int64_t begin, int64_t end)
+static void fold(const es_filter_job* job, es_filter_scratch* s, uint32_t planes, int64_t x, int64_t begin, int64_t end)
 {
     const size_t at = (size_t)(x - begin);
     const int64_t from = folded(x, job->gbuffer->width, job->size);
@@ -22,11 +22,11 @@ static void fold(const es_filter_job* job, es_filter_scratch* s, int64_t x, int6
     const size_t copy = here ? (size_t)(from - begin) : 0;
     s->depth_in[at] = here ? s->depth_in[copy] : -1e30f; /* close to no depth */
     for (int k = 0; k < 3; k++) s->normal_in[k][at] = here ? s->normal_in[k][copy] : 0.0f;
-    for (uint32_t k = 0; k < job->plane_count; k++) s->in[k][at] = here ? s->in[k][copy] : 0.0f;
+    for (uint32_t k = 0; k < planes; k++) s->in[k][at] = here ? s->in[k][copy] : 0.0f;
 }
 
 /* Taps of one line: columns [x0 - margin, x0 + ES_FILTER_COLUMNS + margin) of row y. */
-static void load_line(const es_filter_job* job, uint32_t x0, uint32_t y, es_filter_scratch* s)
+static void load_line(const es_filter_job* job, uint32_t x0, uint32_t y, uint32_t planes, es_filter_scratch* s)
 {
     const es_gbuffer* g = job->gbuffer;
     const size_t row = (size_t)y * g->stride;
@@ -41,10 +41,10 @@ static void load_line(const es_filter_job* job, uint32_t x0, uint32_t y, es_filt
         vf_store(s->normal_in[0] + at, nx);
         vf_store(s->normal_in[1] + at, ny);
         vf_store(s->normal_in[2] + at, nz);
-        for (uint32_t k = 0; k < job->plane_count; k++) vf_store(s->in[k] + at, vf_load(job->source[k] + row + x));
+        for (uint32_t k = 0; k < planes; k++) vf_store(s->in[k] + at, vf_load(job->source[k] + row + x));
     }
-    for (int64_t x = begin; x < 0; x++) fold(job, s, x, begin, end);
-    for (int64_t x = begin > g->width ? begin : g->width; x < end; x++) fold(job, s, x, begin, end);
+    for (int64_t x = begin; x < 0; x++) fold(job, s, planes, x, begin, end);
+    for (int64_t x = begin > g->width ? begin : g->width; x < end; x++) fold(job, s, planes, x, begin, end);
 }
 
 /* `planes` is a constant at every call */
@@ -97,6 +97,21 @@ VINL void filter_column(const es_filter_job* job, const es_filter_scratch* s, co
     }
 }
 
+/* Lobes are rare: where a block's taps of planes 3 … 5 are all zero, so are their means. */
+static bool lobes_are_dark(const es_filter_job* job, uint32_t x0, uint32_t first, uint32_t end)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const uint32_t begin = x0 > ES_FILTER_MARGIN ? x0 - ES_FILTER_MARGIN : 0, stop = x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN < g->stride ? x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN : g->stride;
+    for (uint32_t y = first; y < end; y++) {
+        const size_t row = (size_t)y * g->stride;
+        vi bits = vi_zero();
+        for (uint32_t k = 3; k < 6; k++)
+            for (uint32_t x = begin; x < stop; x += VW) bits |= vi_load(job->source[k] + row + x);
+        if (vm_any(~vi_eq(bits & vi_set1(0x7fffffff), vi_zero()))) return false;
+    }
+    return true;
+}
+
 void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0, es_filter_scratch* s)
 {
     const es_gbuffer* g = job->gbuffer;
@@ -112,11 +127,19 @@ void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0,
     }
     if (end < n) end = n < g->height ? n : g->height;
 
+    uint32_t planes = job->plane_count;
+    if (planes == 6 && lobes_are_dark(job, x0, first, end)) {
+        planes = 3;
+        for (uint32_t y = y0; y < y1; y++)
+            for (uint32_t k = 3; k < 6; k++)
+                for (uint32_t x = 0; x < columns; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x0 + x, vf_zero());
+    }
+
     for (uint32_t y = first; y < end; y++) {
-        load_line(job, x0, y, s);
-        if (job->plane_count == 3) filter_row(job, s, columns, y - first, s, 3);
-        else if (job->plane_count == 6) filter_row(job, s, columns, y - first, s, 6);
-        else filter_row(job, s, columns, y - first, s, job->plane_count);
+        load_line(job, x0, y, planes, s);
+        if (planes == 3) filter_row(job, s, columns, y - first, s, 3);
+        else if (planes == 6) filter_row(job, s, columns, y - first, s, 6);
+        else filter_row(job, s, columns, y - first, s, planes);
     }
     for (uint32_t y = y0; y < y1; y++) {
         uint32_t lines[ES_FILTER_MAX], taps = 0;
@@ -125,8 +148,8 @@ void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0,
             if (from >= 0) lines[taps++] = (uint32_t)from - first;
         }
         size_t out = (size_t)y * g->stride + x0;
-        if (job->plane_count == 3) filter_column(job, s, lines, taps, y - first, columns, out, 3);
-        else if (job->plane_count == 6) filter_column(job, s, lines, taps, y - first, columns, out, 6);
-        else filter_column(job, s, lines, taps, y - first, columns, out, job->plane_count);
+        if (planes == 3) filter_column(job, s, lines, taps, y - first, columns, out, 3);
+        else if (planes == 6) filter_column(job, s, lines, taps, y - first, columns, out, 6);
+        else filter_column(job, s, lines, taps, y - first, columns, out, planes);
     }
 }

@@ -380,6 +380,19 @@ static void scatter(const es_gbuffer* g, const lanes_of_phase* p, uint32_t n, fl
     }
 }
 
+/* A phase without lights. */
+static void darken(const es_shade_job* job, const lanes_of_phase* p)
+{
+    for (uint32_t j = 0; j < p->rows; j++) {
+        const size_t row = (size_t)(p->y0 + j * job->interleave) * job->gbuffer->stride + p->x0;
+        for (int k = 0; k < 3; k++)
+            for (uint32_t i = 0; i < p->columns; i++) {
+                job->irradiance[k][row + (size_t)i * job->interleave] = 0.0f;
+                if (job->specular[0]) job->specular[k][row + (size_t)i * job->interleave] = 0.0f;
+            }
+    }
+}
+
 static void shade_phase(const es_shade_job* job, const es_shade_light* lights, const lanes_of_phase* p, uint32_t phase, es_shade_batch* batch)
 {
     const uint32_t n = job->interleave, lanes = p->lanes * p->rows;
@@ -422,6 +435,10 @@ void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* light
         p.columns = columns - block->column < ES_SHADE_COLUMNS ? columns - block->column : ES_SHADE_COLUMNS;
         p.rows = rows - block->row < block->rows ? rows - block->row : block->rows;
         p.lanes = (p.columns + VW - 1) / VW * VW;
+        if (phase_x + n * block->phase_y >= job->vpl_count && !job->near) {
+            darken(job, &p);
+            continue;
+        }
         shade_phase(job, lights, &p, phase_x + n * block->phase_y, batch);
     }
 }
