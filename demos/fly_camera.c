@@ -59,7 +59,6 @@ static float held(const es_window_input* input, int forward, int backward)
 
 int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* input, float seconds)
 {
-    if (input->down[ES_KEY_CONTROL]) return DEMO_OK; /* these keys are commands */
     float ahead = held(input, 'W', 'S'), right = held(input, 'D', 'A'), up = held(input, 'E', 'Q');
     float turn = held(input, ES_KEY_LEFT, ES_KEY_RIGHT) * 1.5f * seconds,
           tilt = held(input, ES_KEY_UP, ES_KEY_DOWN) * 1.5f * seconds;

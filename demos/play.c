@@ -113,10 +113,21 @@ static int advance(player* p, float elapsed)
     return player_split_update(p);
 }
 
+/* A key that went down with Control is a command until it comes up again, also when Control is let go first. */
+static void leave_commands(player* p, es_window_input* input)
+{
+    bool control = player_with_control(&p->input);
+    for (int key = 0; key < ES_KEY_ESCAPE; key++) {
+        p->commanded[key] = p->input.down[key] && (p->commanded[key] || control);
+        if (p->commanded[key]) input->down[key] = false;
+    }
+}
+
 static int play_frame(player* p, float elapsed)
 {
     es_window_input input = ui_game_input(&p->ui);
     player_take_keys(p, &input);
+    leave_commands(p, &input);
     bool mouse_taken = player_split_drag(p, &input) || player_hand_update(p, &input);
     if (mouse_taken) memset(input.mouse_down, 0, sizeof input.mouse_down);
     if (p->hand.what && p->hand.by_keyboard) input.down[ES_KEY_LEFT] = input.down[ES_KEY_RIGHT] = input.down[ES_KEY_UP] = input.down[ES_KEY_DOWN] = false;

@@ -68,6 +68,7 @@ typedef struct player {
     es_world_settings opened;    /* as the world was opened with */
     es_window* window;
     es_window_input input;
+    bool commanded[ES_KEY_ESCAPE]; /* keys that went down with Control */
     ui ui;
     demo_canvas canvas;
     size_t canvas_pixels;
@@ -106,6 +107,8 @@ void player_open_title(player* p);
 
 /* ---- player_commands.c: everything that has a key ---- */
 void player_take_keys(player* p, const es_window_input* input);
+/* Control is held, or was when the poll that comes late would have seen it. */
+bool player_with_control(const es_window_input* input);
 /* Their list, group by group: false past the last. A command of no key only begins a group. */
 bool player_command_text(size_t index, const char** key, const char** text);
 /* Winds to a state of the history, and pauses. */

@@ -227,9 +227,11 @@ bool player_command_text(size_t index, const char** key, const char** text)
     return true;
 }
 
+bool player_with_control(const es_window_input* input) { return input->down[ES_KEY_CONTROL] || input->pressed[ES_KEY_CONTROL]; }
+
 void player_take_keys(player* p, const es_window_input* input)
 {
-    bool control = input->down[ES_KEY_CONTROL];
+    bool control = player_with_control(input);
     for (size_t i = 0; i < COMMAND_COUNT && !p->quit; i++) {
         const command* c = &commands[i];
         if (c->key && control == (c->with == CONTROL) && (c->repeats ? input->repeated : input->pressed)[c->key]) c->run(p);

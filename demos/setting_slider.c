@@ -149,12 +149,12 @@ double setting_at_fraction(const es_setting* setting, float fraction)
     return within(setting, round_digits(value, 3));
 }
 
-/* A tenth of the value's decade: 1024 goes by 100, 0.026 by 0.001; near zero by a hundredth of what is usual. */
+/* A tenth of the value's decade: 1024 goes by 100, 0.026 by 0.001; near zero by a thousandth of what is usual. */
 static double step_size(const es_setting* setting, double value)
 {
     if (setting->type == ES_SETTING_BOOL || setting->type == ES_SETTING_CHOICE) return 1;
     double usual = fabs(setting_default(setting)), range = setting->maximum - setting->minimum;
-    double least = usual > 0 ? usual / 100 : range / 1000;
+    double least = usual > 0 ? usual / 100 : range / 100;
     double size = fmax(fabs(value), least);
     double step = pow(10, floor(log10(size) + 1e-9) - 1);
     return setting->type == ES_SETTING_INT ? fmax(step, 1) : step;

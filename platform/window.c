@@ -115,10 +115,23 @@ static void on_character(GLFWwindow* glfw, unsigned character)
     if (window->input.text_count < ES_WINDOW_TEXT) window->input.text[window->input.text_count++] = character;
 }
 
+/* On screens with a scale (Wayland) the pointer is told in larger units than the drawable's pixels. */
+static void to_pixels(const es_window* window, double* x, double* y)
+{
+    int width, height, pixels_wide, pixels_high;
+    glfwGetWindowSize(window->glfw, &width, &height);
+    glfwGetFramebufferSize(window->glfw, &pixels_wide, &pixels_high);
+    if (width > 0 && height > 0 && (width != pixels_wide || height != pixels_high)) {
+        *x *= (double)pixels_wide / width;
+        *y *= (double)pixels_high / height;
+    }
+}
+
 /* Also called while events are taken in turn, so that a button's press knows where the pointer was then. */
 static void on_cursor(GLFWwindow* glfw, double x, double y)
 {
     es_window* window = glfwGetWindowUserPointer(glfw);
+    to_pixels(window, &x, &y);
     window->cursor_x = (float)x;
     window->cursor_y = (float)y;
 }
@@ -161,6 +174,7 @@ void es_window_poll(es_window* window, es_window_input* input)
     int width, height;
     glfwGetCursorPos(window->glfw, &x, &y);
     glfwGetFramebufferSize(window->glfw, &width, &height);
+    to_pixels(window, &x, &y);
     state->mouse_dx = (float)x - state->mouse_x;
     state->mouse_dy = (float)y - state->mouse_y;
     state->mouse_x = (float)x;

@@ -1,0 +1,323 @@
+#!/usr/bin/env bash
+# The player, by keyboard and mouse in a window on a screen that nobody sees: every check looks at what came of it, a picture, a title, the
+# settings it prints.
+# usage: player.sh BUILD_DIR SOURCE_DIR
+set -u
+build=$(cd "$1" && pwd)
+source=$(cd "$2" && pwd)
+program=$build/earthshine
+for tool in Xvfb xdotool; do
+    if ! command -v $tool >/dev/null; then
+        echo "skipped: $tool is not installed"
+        exit 77
+    fi
+done
+if [ ! -x "$program" ]; then
+    echo "skipped: the program is not built (EARTHSHINE_DEMOS)"
+    exit 77
+fi
+work=$(mktemp -d)
+screen=
+player=
+compositor=
+end()
+{
+    [ -n "$player" ] && kill "$player" 2>/dev/null
+    [ -n "$compositor" ] && kill "$compositor" 2>/dev/null
+    [ -n "$screen" ] && kill "$screen" 2>/dev/null
+    wait 2>/dev/null
+    rm -rf "$work"
+}
+trap end EXIT
+cd "$work" || exit 1
+checks=0
+failures=0
+
+fail()
+{
+    failures=$((failures + 1))
+    echo "FAILED: $1"
+    tail -n 3 out 2>/dev/null | sed 's/^/    stdout: /'
+    tail -n 3 err 2>/dev/null | sed 's/^/    stderr: /'
+}
+
+# eventually COMMAND…: until it succeeds; a loaded machine may take its time
+eventually()
+{
+    local i
+    for ((i = 0; i < 150; i++)); do
+        "$@" >/dev/null 2>&1 && return 0
+        kill -0 "$player" 2>/dev/null || return 1
+        sleep 0.1
+    done
+    return 1
+}
+check()
+{
+    local what=$1
+    shift
+    checks=$((checks + 1))
+    eventually "$@" || fail "$what"
+}
+
+# Xvfb chooses a display that is free and writes its number
+mkfifo number
+Xvfb -noreset -displayfd 3 -screen 0 1280x1024x24 -nolisten tcp 3>number >xvfb.log 2>&1 &
+screen=$!
+read -r -t 30 display <number || {
+    echo "skipped: Xvfb does not start"
+    exit 77
+}
+export DISPLAY=:$display
+unset WAYLAND_DISPLAY
+
+small=(--set vpl.count=64 --set ism.points=1024 --set ism.pool=65536 --set ism.size=32 --set shadow.size=256)
+
+# play ARGUMENTS…: the player's window is $window
+play()
+{
+    "$program" play "$@" >out 2>err </dev/null &
+    player=$!
+    local i
+    window=
+    for ((i = 0; i < 300; i++)); do
+        window=$(xdotool search --onlyvisible --name '^Earthshine' 2>/dev/null | head -n 1)
+        [ -n "$window" ] && break
+        kill -0 $player 2>/dev/null || break
+        sleep 0.1
+    done
+    if [ -z "$window" ]; then
+        fail "no window: $*"
+        return 1
+    fi
+    xdotool windowmove "$window" 0 0 windowfocus "$window"
+    sleep 0.3
+}
+# quits by the keyboard; the program must end well
+quit()
+{
+    checks=$((checks + 1))
+    key ctrl+q
+    local i
+    for ((i = 0; i < 150; i++)); do
+        kill -0 "$player" 2>/dev/null || break
+        sleep 0.1
+    done
+    if kill -0 "$player" 2>/dev/null; then
+        fail 'it does not quit'
+        kill "$player"
+    fi
+    wait "$player"
+    local code=$?
+    [ $code -eq 0 ] || fail "exit $code"
+    player=
+}
+key()
+{
+    local k
+    for k in "$@"; do
+        xdotool key "$k"
+        sleep 0.12 # longer than a frame, so that each is seen by itself
+    done
+}
+# the settings as the player prints them: a line more on each call
+settings()
+{
+    local before
+    before=$(wc -l <out)
+    key ctrl+s
+    eventually eval "[ \$(wc -l <out) -gt $before ]" || fail 'no settings are printed'
+    tail -n 1 out
+}
+has() { [[ " $2 " == *" $1 "* ]]; }
+pictures() { find pictures -name "*.$1" 2>/dev/null | wc -l; }
+# shot: a new PNG, named in $picture
+shot()
+{
+    local before
+    before=$(pictures png)
+    key F9
+    checks=$((checks + 1))
+    eventually eval "[ \$(find pictures -name '*.png' | wc -l) -gt $before ]" || fail 'no screenshot'
+    picture=$(ls -t pictures/*.png | head -n 1)
+}
+different() { ! "$program" compare "$1" "$2" --max-rmse 0.002 >/dev/null 2>&1; }
+alike() { "$program" compare "$1" "$2" --max-rmse 0.002 >/dev/null 2>&1; }
+
+# ---- keys, panels, settings ------------------------------------------------------------------------------------------
+if play cornell --size 640x480 "${small[@]}"; then
+    key space # still, so that pictures can be compared
+    shot
+    first=$picture
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'a paused scene changes'
+    key m o t h # every panel
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'panels are in the picture'
+    key h t m Escape
+    line=$(settings)
+    checks=$((checks + 1))
+    has '--set vpl.count=64' "$line" || fail "the settings lack what was given: $line"
+
+    # a setting found by its name, stepped by the arrow keys
+    key slash
+    xdotool type --delay 60 'exposure'
+    key Down Down Right Right
+    line=$(settings)
+    checks=$((checks + 1))
+    has '--set exposure=0.02' "$line" || [[ $line == *' --set exposure='* ]] || fail "an arrow key does not change a setting: $line"
+    shot
+    # typed as a number
+    key Return
+    xdotool type --delay 60 '2.5'
+    key Return
+    line=$(settings)
+    checks=$((checks + 1))
+    has '--set exposure=2.5' "$line" || fail "a typed value is not taken: $line"
+    shot
+    checks=$((checks + 1))
+    different "$first" "$picture" || fail 'a setting changes nothing'
+    # and reset
+    key Delete
+    line=$(settings)
+    checks=$((checks + 1))
+    [[ $line != *exposure* ]] || fail "Delete does not reset: $line"
+    key Escape
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'the picture does not come back with its settings'
+
+    # split: the former settings on the right
+    key plus plus plus plus
+    shot
+    bright=$picture
+    key b
+    shot
+    checks=$((checks + 1))
+    different "$bright" "$picture" || fail 'the split shows nothing of the former settings'
+    key b b minus minus minus minus
+
+    # time: one step, then back
+    shot
+    before=$picture
+    key n n n n n n n n n n n n
+    shot
+    checks=$((checks + 1))
+    different "$before" "$picture" || fail 'single steps do not move the scene'
+    key bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft
+    shot
+    checks=$((checks + 1))
+    alike "$before" "$picture" || fail 'winding back does not lead back'
+
+    # a float picture, a sequence
+    key F10
+    check 'no EXR' eval '[ $(find pictures -name "*.exr" | wc -l) -eq 1 ]'
+    key F12
+    check 'no sequence' eval '[ $(find pictures -name "cornell-01-*.png" | wc -l) -ge 3 ]'
+    key F12
+
+    # another scene, from the menu, by keyboard: the second entry
+    key m
+    sleep 0.2
+    key Down Return
+    check 'the menu opens no scene' eval '[ "$(xdotool getwindowname $window)" = "Earthshine: room" ]'
+    quit
+fi
+
+# ---- mouse -----------------------------------------------------------------------------------------------------------
+if play cornell --size 640x480 "${small[@]}"; then
+    key space
+    shot
+    first=$picture
+    # a drag in the picture turns the camera; the drag beside the panels' places
+    xdotool mousemove 320 240 mousedown 1
+    sleep 0.2
+    xdotool mousemove 380 250
+    sleep 0.3
+    xdotool mouseup 1
+    sleep 0.2
+    shot
+    checks=$((checks + 1))
+    different "$first" "$picture" || fail 'a drag does not turn the camera'
+    key r
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'R does not lead back to the camera of the scene'
+
+    # the light, held by the keyboard
+    key k
+    xdotool keydown Left
+    sleep 0.8
+    xdotool keyup Left
+    sleep 0.2
+    shot
+    checks=$((checks + 1))
+    different "$first" "$picture" || fail 'the light does not move'
+    key Escape ctrl+j
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'the light does not come home'
+
+    # a click on the bar opens the settings, a drag of a slider there changes one
+    xdotool mousemove 70 8 click 1
+    sleep 0.3
+    before=$(settings)
+    xdotool mousemove 500 104 mousedown 1
+    sleep 0.2
+    xdotool mousemove 560 104
+    sleep 0.3
+    xdotool mouseup 1
+    sleep 0.2
+    after=$(settings)
+    checks=$((checks + 1))
+    [ "$before" != "$after" ] || fail "a slider that is dragged changes nothing: $after"
+    quit
+fi
+
+# ---- Wayland: a compositor in a window of the same screen, which gives the player all of it ------------------------------
+wayland()
+{
+    command -v weston >/dev/null || { echo "no Wayland: weston is not installed"; return; }
+    local glfw i
+    glfw=$(bash "$source/demos/install-packages" wayland "$build/glfw-wayland") || { echo "no Wayland: no GLFW for it"; return; }
+    export XDG_RUNTIME_DIR=$work/run
+    mkdir -m 700 "$XDG_RUNTIME_DIR"
+    weston --backend=x11-backend.so --shell=kiosk-shell.so --no-config --width=800 --height=600 --socket=earthshine --idle-time=0 >weston.log 2>&1 &
+    compositor=$!
+    for ((i = 0; i < 100; i++)); do
+        [ -S "$XDG_RUNTIME_DIR/earthshine" ] && break
+        sleep 0.1
+    done
+    [ -S "$XDG_RUNTIME_DIR/earthshine" ] || { echo "no Wayland: weston does not start"; return; }
+    DISPLAY= WAYLAND_DISPLAY=earthshine LD_LIBRARY_PATH=$glfw "$program" play cornell --size 640x480 "${small[@]}" >out 2>err </dev/null &
+    player=$!
+    for i in $(xdotool search --onlyvisible --name '.*' 2>/dev/null); do
+        [[ $(xdotool getwindowname "$i") == Weston* ]] && xdotool windowmove "$i" 0 0 windowfocus "$i"
+    done
+    xdotool mousemove 300 300
+    sleep 2
+    key space # the first press may come before the window is there
+    shot
+    local first=$picture
+    key plus plus plus plus
+    shot
+    checks=$((checks + 1))
+    different "$first" "$picture" || fail 'a key does nothing on Wayland'
+    xdotool mousemove 400 300 mousedown 1
+    sleep 0.2
+    xdotool mousemove 460 310
+    sleep 0.3
+    xdotool mouseup 1
+    sleep 0.2
+    first=$picture
+    shot
+    checks=$((checks + 1))
+    different "$first" "$picture" || fail 'the mouse does nothing on Wayland'
+    quit
+}
+wayland
+
+echo "$checks checks, $failures failures"
+[ $failures -eq 0 ]
