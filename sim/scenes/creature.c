@@ -42,17 +42,17 @@ enum { STATIONS = 8, INFLUENCES = 4 };
 typedef struct part { uint32_t count; station stations[STATIONS]; es_vec3 side; uint8_t follows[INFLUENCES]; uint32_t around, along; } part;
 
 static const part trunk_and_body[] = {
-    {8, {{{0, 0.98f, 0.72f}, 0.01f, 0.01f}, {{0, 0.99f, 0.66f}, 0.22f, 0.24f}, {{0, 0.98f, 0.45f}, 0.34f, 0.37f}, {{0, 0.95f, 0.1f}, 0.39f, 0.40f}, {{0, 0.96f, -0.25f}, 0.37f, 0.39f},
-            {{0, 1.0f, -0.5f}, 0.31f, 0.33f}, {{0, 1.02f, -0.66f}, 0.17f, 0.2f}, {{0, 1.02f, -0.7f}, 0.01f, 0.01f}}, {1, 0, 0}, {HIPS, CHEST, HIPS, CHEST}, 40, 36},
-    {7, {{{0, 1.02f, -0.38f}, 0.01f, 0.01f}, {{0, 1.06f, -0.5f}, 0.22f, 0.25f}, {{0, 1.2f, -0.72f}, 0.21f, 0.24f}, {{0, 1.28f, -0.88f}, 0.23f, 0.25f}, {{0, 1.24f, -1.03f}, 0.18f, 0.19f},
-            {{0, 1.15f, -1.13f}, 0.11f, 0.11f}, {{0, 1.12f, -1.15f}, 0.01f, 0.01f}}, {1, 0, 0}, {CHEST, NECK, HEAD, NECK}, 32, 28},
-    {7, {{{0, 1.24f, -1.0f}, 0.01f, 0.01f}, {{0, 1.13f, -1.1f}, 0.11f, 0.11f}, {{0, 0.85f, -1.25f}, 0.085f, 0.08f}, {{0, 0.5f, -1.31f}, 0.06f, 0.06f}, {{0, 0.3f, -1.26f}, 0.047f, 0.047f},
-            {{0, 0.2f, -1.17f}, 0.036f, 0.036f}, {{0, 0.18f, -1.14f}, 0.005f, 0.005f}}, {1, 0, 0}, {HEAD, TRUNK_1, TRUNK_2, TRUNK_3}, 20, 44},
-    {5, {{{0, 1.12f, 0.6f}, 0.01f, 0.01f}, {{0, 1.06f, 0.68f}, 0.04f, 0.04f}, {{0, 0.8f, 0.76f}, 0.025f, 0.025f}, {{0, 0.56f, 0.79f}, 0.04f, 0.04f}, {{0, 0.46f, 0.8f}, 0.005f, 0.005f}},
+    {8, {{{0, 0.98f, 0.72f}, 0, 0}, {{0, 0.99f, 0.66f}, 0.22f, 0.24f}, {{0, 0.98f, 0.45f}, 0.34f, 0.37f}, {{0, 0.95f, 0.1f}, 0.39f, 0.40f}, {{0, 0.96f, -0.25f}, 0.37f, 0.39f},
+            {{0, 1.0f, -0.5f}, 0.31f, 0.33f}, {{0, 1.02f, -0.66f}, 0.17f, 0.2f}, {{0, 1.02f, -0.7f}, 0, 0}}, {1, 0, 0}, {HIPS, CHEST, HIPS, CHEST}, 40, 36},
+    {7, {{{0, 1.02f, -0.38f}, 0, 0}, {{0, 1.06f, -0.5f}, 0.22f, 0.25f}, {{0, 1.2f, -0.72f}, 0.21f, 0.24f}, {{0, 1.28f, -0.88f}, 0.23f, 0.25f}, {{0, 1.24f, -1.03f}, 0.18f, 0.19f},
+            {{0, 1.15f, -1.13f}, 0.11f, 0.11f}, {{0, 1.12f, -1.15f}, 0, 0}}, {1, 0, 0}, {CHEST, NECK, HEAD, NECK}, 32, 28},
+    {7, {{{0, 1.24f, -1.0f}, 0, 0}, {{0, 1.13f, -1.1f}, 0.11f, 0.11f}, {{0, 0.85f, -1.25f}, 0.085f, 0.08f}, {{0, 0.5f, -1.31f}, 0.06f, 0.06f}, {{0, 0.3f, -1.26f}, 0.047f, 0.047f},
+            {{0, 0.2f, -1.17f}, 0.036f, 0.036f}, {{0, 0.18f, -1.14f}, 0, 0}}, {1, 0, 0}, {HEAD, TRUNK_1, TRUNK_2, TRUNK_3}, 20, 44},
+    {5, {{{0, 1.12f, 0.6f}, 0, 0}, {{0, 1.06f, 0.68f}, 0.04f, 0.04f}, {{0, 0.8f, 0.76f}, 0.025f, 0.025f}, {{0, 0.56f, 0.79f}, 0.04f, 0.04f}, {{0, 0.46f, 0.8f}, 0, 0}},
         {1, 0, 0}, {HIPS, TAIL, TAIL, TAIL}, 12, 16},
-    {4, {{{-0.16f, 1.36f, -0.88f}, 0.02f, 0.01f}, {{-0.28f, 1.30f, -0.82f}, 0.2f, 0.025f}, {{-0.44f, 1.18f, -0.75f}, 0.19f, 0.02f}, {{-0.56f, 1.06f, -0.7f}, 0.02f, 0.005f}},
+    {4, {{{-0.16f, 1.36f, -0.88f}, 0, 0}, {{-0.28f, 1.30f, -0.82f}, 0.2f, 0.025f}, {{-0.44f, 1.18f, -0.75f}, 0.19f, 0.02f}, {{-0.56f, 1.06f, -0.7f}, 0, 0}},
         {0, 0.85f, 0.5f}, {HEAD, LEFT_EAR, LEFT_EAR, LEFT_EAR}, 20, 18},
-    {4, {{{0.16f, 1.36f, -0.88f}, 0.02f, 0.01f}, {{0.28f, 1.30f, -0.82f}, 0.2f, 0.025f}, {{0.44f, 1.18f, -0.75f}, 0.19f, 0.02f}, {{0.56f, 1.06f, -0.7f}, 0.02f, 0.005f}},
+    {4, {{{0.16f, 1.36f, -0.88f}, 0, 0}, {{0.28f, 1.30f, -0.82f}, 0.2f, 0.025f}, {{0.44f, 1.18f, -0.75f}, 0.19f, 0.02f}, {{0.56f, 1.06f, -0.7f}, 0, 0}},
         {0, 0.85f, 0.5f}, {HEAD, RIGHT_EAR, RIGHT_EAR, RIGHT_EAR}, 20, 18},
 };
 enum { BODY_PARTS = sizeof trunk_and_body / sizeof trunk_and_body[0], PARTS = BODY_PARTS + 4 };
@@ -61,15 +61,17 @@ static part leg_part(uint32_t leg)
 {
     const es_vec3 top = bones[UPPER(leg)].head;
     const float x = top.x, z = top.z;
-    part p = {6, {{{x, 1.02f, z}, 0.01f, 0.01f}, {{x, 0.9f, z}, 0.16f, 0.19f}, {{x, 0.5f, z}, 0.115f, 0.12f}, {{x, 0.14f, z}, 0.11f, 0.11f}, {{x, 0.03f, z}, 0.13f, 0.13f}, {{x, 0.0f, z}, 0.01f, 0.01f}},
+    part p = {6, {{{x, 1.02f, z}, 0, 0}, {{x, 0.9f, z}, 0.16f, 0.19f}, {{x, 0.5f, z}, 0.115f, 0.12f}, {{x, 0.14f, z}, 0.11f, 0.11f}, {{x, 0.03f, z}, 0.13f, 0.13f}, {{x, 0.0f, z}, 0, 0}},
         {1, 0, 0}, {bones[UPPER(leg)].parent, UPPER(leg), LOWER(leg), LOWER(leg)}, 22, 24};
     return p;
 }
 
 static float catmull(float a, float b, float c, float d, float t) { return b + 0.5f * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a))); }
 
+/* Exact at both ends, where the tube closes in a point. */
 static station station_at(const part* p, float v)
 {
+    if (v >= 1) return p->stations[p->count - 1];
     float along = v * (float)(p->count - 1);
     uint32_t i = (uint32_t)along;
     if (i > p->count - 2) i = p->count - 2;
@@ -77,8 +79,9 @@ static station station_at(const part* p, float v)
     const station *b = &p->stations[i], *c = b + 1, *a = i ? b - 1 : b, *d = i + 2 < p->count ? c + 1 : c;
     station s;
     for (int k = 0; k < 3; k++) (&s.at.x)[k] = catmull((&a->at.x)[k], (&b->at.x)[k], (&c->at.x)[k], (&d->at.x)[k], t);
-    s.wide = es_maxf(0.003f, catmull(a->wide, b->wide, c->wide, d->wide, t));
-    s.deep = es_maxf(0.003f, catmull(a->deep, b->deep, c->deep, d->deep, t));
+    float least = v > 0 ? 0.003f : 0;
+    s.wide = es_maxf(least, catmull(a->wide, b->wide, c->wide, d->wide, t));
+    s.deep = es_maxf(least, catmull(a->deep, b->deep, c->deep, d->deep, t));
     return s;
 }
 
@@ -95,6 +98,11 @@ static void skin_surface(const void* parameters, float u, float v, es_vec3* posi
     const part* p = parameters;
     const float h = 2e-3f;
     *position = skin_point(p, u, v);
+    if (v <= 0 || v >= 1) { /* a pole: along the tube, outwards */
+        es_vec3 inside = station_at(p, v > 0 ? 0.98f : 0.02f).at;
+        *normal = es_v3_normalize(es_v3_sub(*position, inside), es_v3(0, 1, 0));
+        return;
+    }
     es_vec3 du = es_v3_sub(skin_point(p, u + h, v), skin_point(p, u - h, v));
     es_vec3 dv = es_v3_sub(skin_point(p, u, es_minf(v + h, 1)), skin_point(p, u, es_maxf(v - h, 0)));
     es_vec3 axis = station_at(p, v).at;
