@@ -15,4 +15,9 @@ es_result es_rigid_step(es_world* world, float h, uint32_t substeps);
 /* Puts the nodes of dynamic bodies between the last two steps: 0 … 1, 1 the last. */
 void es_rigid_pose(es_world* world, float alpha);
 
+/* Cloth and soft bodies (sim/soft/soft_step.c, soft_pose.c): after the rigid bodies, whose way within the step they meet and whose velocities
+ * they change for the next one. */
+es_result es_soft_step(es_world* world, float h, uint32_t substeps);
+es_result es_soft_pose(es_world* world, float alpha);
+
 #endif

@@ -5,6 +5,7 @@
 #include "platform/platform.h"
 #include "sim/deform.h"
 #include "sim/rigid/solver.h"
+#include "sim/soft/soft_kernels.h"
 
 /* X(name, arguments) */
 #define ES_SIM_KERNELS(X)                                                                                        \
@@ -30,7 +31,21 @@
     /* makes directions unit; those without one become `otherwise`. The fourth float stays */                    \
     X(unit, (float* directions, const float* otherwise, uint32_t begin, uint32_t end))                           \
     /* at least one block; bounds: least x y z and a float left alone, then the most */                          \
-    X(bounds, (const float* positions, uint32_t begin, uint32_t end, float* bounds))
+    X(bounds, (const float* positions, uint32_t begin, uint32_t end, float* bounds)) \
+    /* slots [begin, end), both multiples of 8: velocities of the last substep, gravity, damping, and on for one substep */ \
+    X(soft_move, (const es_soft_motion* motion, uint32_t begin, uint32_t end))                                   \
+    /* after the last substep: velocities, and the square of the largest */                                      \
+    X(soft_settle, (const es_soft_motion* motion, uint32_t begin, uint32_t end, float* fastest))                 \
+    X(soft_reach, (float* positions, const es_soft_reach* job, uint32_t begin, uint32_t end))                    \
+    X(soft_links, (float* positions, const es_soft_links* batches, uint32_t count, float inverse_h2))            \
+    /* length over rest length, 8 per batch; 0 where that is no number */                                        \
+    X(soft_stretch, (const float* positions, const es_soft_links* batches, uint32_t count, float* ratio))        \
+    /* compliance: over h² */                                                                                    \
+    X(soft_volumes, (float* positions, const es_soft_volumes* batches, uint32_t count, float compliance))        \
+    /* push: linear and angular momentum over h that the particles got are added to it */                        \
+    X(soft_contact, (float* positions, const float* previous, const es_soft_surface* surface, uint32_t begin, uint32_t end, float push[6])) \
+    /* blocks [begin, end) of eight slots */                                                                     \
+    X(soft_air, (const es_soft_air* job, uint32_t begin, uint32_t end))
 
 struct es_sim_kernels {
 #define ES_SIM_KERNEL_FIELD(name, arguments) void (*name) arguments;

@@ -242,6 +242,24 @@ bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh)
     return true;
 }
 
+/* Before vertices are written: the first change since the step began makes what is there last frame's. */
+static void begin_change(es_world* world, es_mesh_object* mesh)
+{
+    if (!mesh->moving && world->stepped) {
+        memcpy(mesh->previous, mesh->positions, es_mesh_stream_bytes(mesh->raster.vertex_count));
+        mesh->raster.previous_positions = mesh->previous;
+        mesh->moving = true;
+    }
+    mesh->deformed = true;
+}
+
+static void end_change(es_world* world, es_mesh_object* mesh)
+{
+    mesh->raster.revision = es_context_next_serial(world->context);
+    update_bounds(mesh);
+    if (mesh->object.references) world->geometry_touched = world->list_dirty = true;
+}
+
 es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* positions, const float* normals)
 {
     if (!world) return ES_INVALID_ARGUMENT;
@@ -261,21 +279,82 @@ es_result es_world_deform_mesh(es_world* world, es_mesh mesh, const float* posit
         differs = memcmp(object->positions + 4 * v, positions + 3 * v, 3 * sizeof(float)) != 0 ||
                   (normals && memcmp(object->normals + 4 * v, normals + 3 * v, 3 * sizeof(float)) != 0);
     if (!differs) return ES_OK;
-    if (!object->moving && world->stepped) { /* the first change since the step began: what is there now is last frame's */
-        memcpy(object->previous, object->positions, es_mesh_stream_bytes(object->raster.vertex_count));
-        object->raster.previous_positions = object->previous;
-        object->moving = true;
-    }
-    object->deformed = true;
+    begin_change(world, object);
     for (size_t v = 0, total = padded(object->raster.vertex_count); v < total; v++) {
         size_t from = v < count ? v : 0;
         memcpy(object->positions + 4 * v, positions + 3 * from, 3 * sizeof(float));
         if (normals && direction_usable(normals + 3 * from)) memcpy(object->normals + 4 * v, normals + 3 * from, 3 * sizeof(float));
     }
-    object->raster.revision = es_context_next_serial(world->context);
-    update_bounds(object);
-    if (object->object.references) world->geometry_touched = world->list_dirty = true;
+    end_change(world, object);
     return ES_OK;
+}
+
+bool es_mesh_take_positions(es_world* world, es_mesh_object* mesh, const float* positions, bool* changed)
+{
+    const size_t count = mesh->raster.vertex_count;
+    *changed = false;
+    if (!es_mesh_make_deformable(world, mesh)) return false;
+    if (memcmp(mesh->positions, positions, count * 4 * sizeof(float)) == 0) return true;
+    *changed = true;
+    begin_change(world, mesh);
+    memcpy(mesh->positions, positions, count * 4 * sizeof(float));
+    for (size_t v = count, total = padded(mesh->raster.vertex_count); v < total; v++) memcpy(mesh->positions + 4 * v, positions, 4 * sizeof(float));
+    end_change(world, mesh);
+    return true;
+}
+
+void es_mesh_reindexed(es_world* world, es_mesh_object* mesh)
+{
+    if (mesh->fans) {
+        es_vertex_fans_free(world->context, mesh->fans);
+        es_release(world->context, mesh->fans, sizeof *mesh->fans);
+        mesh->fans = NULL;
+    }
+    mesh->raster.revision = es_context_next_serial(world->context);
+    if (mesh->object.references) world->geometry_touched = world->list_dirty = true;
+}
+
+void es_mesh_copy_vertex(es_mesh_object* mesh, uint32_t to, uint32_t from)
+{
+    float* streams[] = {mesh->tangents, mesh->uvs, mesh->colors, mesh->rest, mesh->rest_normals};
+    for (size_t i = 0; i < sizeof streams / sizeof streams[0]; i++)
+        if (streams[i]) memcpy(streams[i] + 4 * (size_t)to, streams[i] + 4 * (size_t)from, 4 * sizeof(float));
+}
+
+bool es_mesh_reserve(es_world* world, es_mesh_object* mesh, uint32_t extra)
+{
+    es_context* context = world->context;
+    const uint32_t before = mesh->raster.vertex_count, after = before + extra;
+    float** streams[] = {&mesh->positions, &mesh->normals, &mesh->tangents, &mesh->uvs, &mesh->colors, &mesh->previous, &mesh->rest, &mesh->rest_normals, &mesh->rest_tangents};
+    enum { STREAMS = sizeof streams / sizeof streams[0] };
+    float* larger[STREAMS] = {0};
+    bool good = after <= MAX_VERTICES;
+    if (!good) es_fail(context, ES_INVALID_ARGUMENT, "mesh '%.64s': no room for %u more vertices", label(mesh->object.name), extra);
+    for (size_t i = 0; i < STREAMS && good; i++)
+        if (*streams[i]) good = (larger[i] = es_allocate(context, es_mesh_stream_bytes(after))) != NULL;
+    for (size_t i = 0; i < STREAMS; i++) {
+        if (!larger[i]) continue;
+        if (!good) {
+            es_release(context, larger[i], es_mesh_stream_bytes(after));
+            continue;
+        }
+        memcpy(larger[i], *streams[i], (size_t)before * 4 * sizeof(float));
+        for (size_t v = before, total = padded(after); v < total; v++) memcpy(larger[i] + 4 * v, *streams[i], 4 * sizeof(float));
+        es_release(context, *streams[i], es_mesh_stream_bytes(before));
+        *streams[i] = larger[i];
+    }
+    if (!good) return false;
+    es_raster_mesh* raster = &mesh->raster;
+    raster->vertex_count = after;
+    raster->positions = mesh->positions;
+    raster->normals = mesh->normals;
+    raster->tangents = mesh->tangents;
+    raster->uvs = mesh->uvs;
+    raster->colors = mesh->colors;
+    if (raster->previous_positions) raster->previous_positions = mesh->previous;
+    if (raster->rest_positions) raster->rest_positions = mesh->rest;
+    es_mesh_reindexed(world, mesh);
+    return true;
 }
 
 es_result es_world_recompute_normals(es_world* world, es_mesh mesh)

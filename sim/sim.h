@@ -30,6 +30,7 @@ typedef struct es_light { uint32_t id; } es_light;
 typedef struct es_clip { uint32_t id; } es_clip;
 typedef struct es_mover { uint32_t id; } es_mover;
 typedef struct es_skin { uint32_t id; } es_skin;
+typedef struct es_soft { uint32_t id; } es_soft;
 
 /* ---- the world itself ------------------------------------------------------------------------------------------------------------ */
 
@@ -448,6 +449,99 @@ ES_API es_result es_world_move_hand(es_world* world, uint32_t hand, const double
 ES_API es_result es_world_release(es_world* world, uint32_t hand);
 ES_API es_result es_world_get_hand(const es_world* world, uint32_t hand, es_hand_state* state);
 
+/* ---- cloth and soft bodies ------------------------------------------------------------------------------------------------------------------ */
+
+/* Particles under gravity, held together by constraints with compliances: extended position-based dynamics (Macklin, Müller, Chentanez 2016)
+ * in small steps of one iteration each (Macklin et al. 2019). A cloth's particles are its mesh's vertices, those at one place welded; its
+ * edges resist stretch, its diagonals shear, what lies across its edges bending. A solid's particles span tetrahedra, which keep their
+ * volume, and carry a mesh inside them. Both collide with the shapes of bodies (and push dynamic ones), a cloth also with itself. They are
+ * simulated along the world's axes, where the node stood when they were added, and written back into the mesh in the node's axes, normals
+ * recomputed, so that they are where the simulation says wherever the node goes. The mesh is theirs: one soft body per mesh. */
+
+/* Of a solid. Arrays belong to whoever made it: es_soft_fill's are freed with es_soft_solid_free. Places in the mesh's axes. */
+typedef struct es_soft_solid {
+    uint32_t particle_count, tetrahedron_count;
+    float* particles;         /* 3 per particle */
+    uint32_t* tetrahedra;     /* 4 particles each, either orientation */
+} es_soft_solid;
+/* Cubes of edge `spacing` (metres of the mesh) that meet the inside of a closed mesh, five tetrahedra each. INVALID_ARGUMENT when that would
+ * be more than 2^18 cubes in the mesh's box, or none. A mesh that is not closed is filled where a line along x crosses it an odd number of times. */
+ES_API es_result es_soft_fill(const es_world* world, es_mesh mesh, float spacing, es_soft_solid* solid);
+ES_API void es_soft_solid_free(const es_world* world, es_soft_solid* solid); /* zeroes *solid; a zero one is allowed */
+
+/* What holds a vertex: a node, a body (which feels the pull), or, both null, the world. */
+typedef struct es_soft_attachment {
+    uint32_t vertex;          /* of the mesh; a solid's: the particle's number */
+    es_node node;
+    es_body body;
+    bool in_place;            /* held where it is now, `local` is not read */
+    es_vec3 local;            /* in the axes of node, body or world */
+} es_soft_attachment;
+
+/* Start from es_default_soft_desc. Out of range is INVALID_ARGUMENT. */
+typedef struct es_soft_desc {
+    const char* name;
+    es_mesh mesh;
+    es_node node;             /* of the instance that shows the mesh; null: the world's axes */
+    const es_soft_solid* solid; /* NULL: a cloth. Copied */
+    float mass;               /* kg, of the whole, 1e-6 … 1e6, by area or volume over the particles. Default 1 */
+    float stretch_compliance, shear_compliance; /* m/N, 0 … 1e6. Default 0: as stiff as the substeps make it. Edges of a solid: stretch */
+    float bend_compliance;    /* m/N; negative: nothing resists bending. Default 0.1 */
+    float volume_compliance;  /* m³·m³/J, of each tetrahedron. Default 0 */
+    float damping;            /* share of the velocity lost per second, 1/s, 0 … 1e3. Default 0.3 */
+    float thickness;          /* m, 0 … 10: kept from shapes, and between parts of itself. Default 0.02 */
+    float friction;           /* 0 … 10, the larger of it and the shape's counts. Default 0.4 */
+    float drag;               /* of air against the surface, kg/(m² s), 0 … 1e3. Default 0.1 */
+    es_vec3 wind;             /* the air's velocity, m/s, up to 1e3 */
+    float pressure;           /* Pa inside a closed cloth at its rest volume V₀, falling as V₀/V; -1e6 … 1e6 */
+    float gravity_scale;      /* -100 … 100. Default 1 */
+    bool self_collision;      /* cloth only */
+    float tear_stretch;       /* cloth: an edge longer than this many times its rest length tears; 0: never, else 1.01 … 1e3 */
+    bool tearable;            /* cloth: es_world_soft_tear may be called (vertices are kept in reserve); set by tear_stretch */
+    uint32_t substeps;        /* per fixed step, 1 … 1024; 0: by the number of particles */
+    const es_soft_attachment* attachments; uint32_t attachment_count;
+} es_soft_desc;
+ES_API es_soft_desc es_default_soft_desc(void);
+
+/* The mesh must have no soft body or skin yet. Where the cloth may tear, its mesh gets more vertices (copies of others until they are needed);
+ * where the reserve is used up, torn triangles vanish instead of parting. */
+ES_API es_result es_world_add_soft(es_world* world, const es_soft_desc* desc, es_soft* soft);
+/* The mesh stays as it is. */
+ES_API es_result es_world_destroy_soft(es_world* world, es_soft soft);
+/* The numbers in use; attachments and solid are NULL. */
+ES_API es_result es_world_get_soft(const es_world* world, es_soft soft, es_soft_desc* desc);
+/* Takes compliances, damping, friction, drag, wind, pressure, gravity_scale, tear_stretch, thickness and self_collision, leaves the rest; wakes it. */
+ES_API es_result es_world_set_soft(es_world* world, es_soft soft, const es_soft_desc* desc);
+
+typedef struct es_soft_state {
+    uint32_t particles, triangles; /* torn: more particles, and perhaps fewer triangles, than at first */
+    uint32_t attachments, torn;    /* held vertices; vertices that have parted */
+    bool asleep;                   /* at rest: it is not computed, and its mesh keeps its bits */
+    float largest_stretch;         /* length over rest length of the worst of the mesh's (a solid: of the tetrahedra's) edges */
+    float volume, rest_volume;     /* of the tetrahedra; a cloth: enclosed by its triangles, of meaning only when they are closed */
+    float kinetic_energy;          /* J */
+    double centre[3];              /* of mass, world */
+} es_soft_state;
+ES_API es_result es_world_get_soft_state(const es_world* world, es_soft soft, es_soft_state* state);
+/* Where the simulation has it (not interpolated), and its velocity (may be NULL). Solid: particle. INVALID_ARGUMENT when there is no such vertex. */
+ES_API es_result es_world_get_soft_vertex(const es_world* world, es_soft soft, uint32_t vertex, double position[3], es_vec3* velocity);
+/* N s, on the particle of the vertex, or with ES_SOFT_ALL shared by all by their mass. */
+#define ES_SOFT_ALL 0xffffffffu
+ES_API es_result es_world_soft_impulse(es_world* world, es_soft soft, uint32_t vertex, es_vec3 impulse);
+/* A vertex that is held already is held anew. */
+ES_API es_result es_world_soft_attach(es_world* world, es_soft soft, const es_soft_attachment* attachment);
+ES_API es_result es_world_soft_detach(es_world* world, es_soft soft, uint32_t vertex_or_all);
+/* Vertices within `radius` of `point` part into one for each of their triangles, edges that only pass through there tear. WRONG_STATE when it is
+ * not tearable. */
+ES_API es_result es_world_soft_tear(es_world* world, es_soft soft, const double point[3], float radius);
+/* A hand (see above) holds the vertex (a solid's particle) and takes it along with up to 10 m/s. */
+ES_API es_result es_world_grab_soft(es_world* world, uint32_t hand, es_soft soft, uint32_t vertex, const double target[3]);
+ES_API es_result es_world_wake_soft(es_world* world, es_soft soft);
+
+typedef struct es_soft_contact { es_soft soft; uint32_t vertex /* nearest of the triangle; solid: particle */; float distance; es_vec3 normal; double point[3]; } es_soft_contact;
+/* The first triangle of any soft body that a ray from `origin` meets within `max` metres, from either side; soft null: none. */
+ES_API es_result es_world_soft_pick(const es_world* world, const double origin[3], es_vec3 direction, float max, es_soft_contact* contact);
+
 /* ---- destroying and enumerating ----------------------------------------------------------------------------------------------------------------- */
 
 /* Refused (WRONG_STATE) while something that exists refers to the object. */
@@ -475,6 +569,7 @@ typedef enum es_object_kind {
     ES_OBJECT_SKIN,
     ES_OBJECT_BODY,
     ES_OBJECT_JOINT,
+    ES_OBJECT_SOFT,
     ES_OBJECT_KINDS
 } es_object_kind;
 /* Handles of all objects of a kind in creation-slot order; *count is the capacity in, the number of objects out; ids NULL asks for it. */

@@ -6,6 +6,7 @@
 #include "sim/recording.h"
 #include "sim/state_io.h"
 
+#include "sim/soft/soft_state.h"
 #include "sim/rigid/rigid_state.h"
 
 static void visit_node(es_world* world, state_io* io, es_node_object* node)
@@ -241,6 +242,7 @@ static void visit_object(es_world* world, state_io* io, es_object_kind kind, voi
     case ES_OBJECT_MESH: visit_mesh(world, io, object); break;
     case ES_OBJECT_BODY: es_visit_body(world, io, object); break;
     case ES_OBJECT_JOINT: es_visit_joint(world, io, object); break;
+    case ES_OBJECT_SOFT: es_visit_soft(world, io, object); break;
     default: break; /* assets: nothing of them moves */
     }
 }
@@ -274,7 +276,7 @@ static void visit_world(es_world* world, state_io* io)
         world->camera_dirty = world->nodes_moving = world->list_dirty = true;
     }
     visit_environment(world, io);
-    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_MOVER, ES_OBJECT_CLIP, ES_OBJECT_MESH, ES_OBJECT_BODY, ES_OBJECT_JOINT};
+    static const es_object_kind kinds[] = {ES_OBJECT_NODE, ES_OBJECT_INSTANCE, ES_OBJECT_CAMERA, ES_OBJECT_LIGHT, ES_OBJECT_MOVER, ES_OBJECT_CLIP, ES_OBJECT_MESH, ES_OBJECT_BODY, ES_OBJECT_JOINT, ES_OBJECT_SOFT};
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; k++)
         for (uint32_t slot = 0; slot < world->slots[kinds[k]].slot_count && (io->good || !reading(io)); slot++) {
             void* object = es_slots_at(&world->slots[kinds[k]], slot);
@@ -303,6 +305,7 @@ static uint64_t content_signature(const es_world* world)
                 words[2] = ((const es_skin_object*)object)->joint_count;
             }
             if (object && kind == ES_OBJECT_BODY) es_body_signature((const es_body_object*)object, words + 1);
+            if (object && kind == ES_OBJECT_SOFT) es_soft_signature((const es_soft_object*)object, words + 1);
             if (object && kind == ES_OBJECT_JOINT) es_joint_signature((const es_joint_object*)object, words + 1);
             hash = es_hash_bytes(hash, words, sizeof words);
         }

@@ -14,7 +14,7 @@ static double tolerance(const es_world* world) { return 1e-4 * (double)world->se
 
 bool es_dynamics_present(const es_world* world)
 {
-    return world->slots[ES_OBJECT_BODY].live > 0;
+    return world->slots[ES_OBJECT_BODY].live > 0 || world->slots[ES_OBJECT_SOFT].live > 0;
 }
 
 /* What bodies stand on and cloth hangs from is taken to where it is at the step's end. */
@@ -29,7 +29,8 @@ static es_result fixed_step(es_world* world)
     world->fixed_count++;
     pose_at(world, es_fixed_time(world));
     es_nodes_refresh(world);
-    return es_rigid_step(world, world->settings.step, world->settings.substeps);
+    es_result result = es_rigid_step(world, world->settings.step, world->settings.substeps);
+    return result == ES_OK ? es_soft_step(world, world->settings.step, world->settings.substeps) : result;
 }
 
 float es_step_phase(const es_world* world)
@@ -73,6 +74,7 @@ es_result es_world_step(es_world* world, float dt)
         pose_at(world, world->time);
         es_nodes_refresh(world); /* what bodies' nodes are below */
         es_rigid_pose(world, es_step_phase(world));
+        if (result == ES_OK) result = es_soft_pose(world, es_step_phase(world));
         es_fp_leave(environment);
         if (world->step_function) world->step_function(world, world->step_user, world->time, (float)seconds);
         world->in_step = false;

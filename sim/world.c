@@ -6,6 +6,7 @@
 #include "platform/maths.h"
 #include "platform/settings.h"
 #include "sim/rigid/rigid.h"
+#include "sim/soft/soft.h"
 
 /* ---- handles ------------------------------------------------------------------------------------------------------------ */
 
@@ -21,6 +22,7 @@ static const struct { const char* name; size_t size; uint32_t limit; } kinds[ES_
     [ES_OBJECT_MOVER] = {"mover", sizeof(es_mover_object), ES_SLOT_LIMIT},
     [ES_OBJECT_SKIN] = {"skin", sizeof(es_skin_object), ES_SLOT_LIMIT},
     [ES_OBJECT_BODY] = {"body", sizeof(es_body_object), ES_SLOT_LIMIT},
+    [ES_OBJECT_SOFT] = {"soft body", sizeof(es_soft_object), ES_SLOT_LIMIT},
     [ES_OBJECT_JOINT] = {"joint", sizeof(es_joint_object), ES_SLOT_LIMIT},
 };
 
@@ -103,6 +105,10 @@ void es_world_destroy(es_world* world)
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_TEXTURE].slot_count; slot++) {
         es_texture_object* texture = es_slots_at(&world->slots[ES_OBJECT_TEXTURE], slot);
         if (texture) es_texture_image_destroy(context, &texture->image);
+    }
+    for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_SOFT].slot_count; slot++) {
+        es_soft_object* soft = es_slots_at(&world->slots[ES_OBJECT_SOFT], slot);
+        if (soft) es_soft_free(world, soft);
     }
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_SKIN].slot_count; slot++) {
         es_skin_object* skin = es_slots_at(&world->slots[ES_OBJECT_SKIN], slot);

@@ -34,6 +34,7 @@ typedef struct es_mesh_object {
     uint32_t* indices;
     bool deformed;           /* ever, by es_world_deform_mesh: its vertices are state, not an asset */
     bool moving;             /* deformed since the step began or at the one before */
+    uint32_t soft;           /* the soft body whose mesh it is, or 0 */
 } es_mesh_object;
 
 typedef struct es_skin_object {
@@ -187,6 +188,13 @@ void es_movers_play(es_world* world, double time);
 bool es_mover_numbers_valid(const es_mover_desc* desc);
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
 void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
+/* Room for `extra` more vertices, copies of the first one. False after es_fail. */
+bool es_mesh_reserve(es_world* world, es_mesh_object* mesh, uint32_t extra);
+/* Gives vertex `to` what vertex `from` has besides its place and normal. */
+void es_mesh_copy_vertex(es_mesh_object* mesh, uint32_t to, uint32_t from);
+void es_mesh_reindexed(es_world* world, es_mesh_object* mesh); /* after its indices were changed */
+/* es_world_deform_mesh for positions of 4 floats per vertex, without normals. False after es_fail. */
+bool es_mesh_take_positions(es_world* world, es_mesh_object* mesh, const float* positions, bool* changed);
 void es_mesh_object_free(es_world* world, es_mesh_object* mesh);
 size_t es_mesh_stream_bytes(uint32_t vertex_count);
 /* Of a deformable mesh that has normals, from its present positions; false after es_fail. */
