@@ -57,10 +57,10 @@ es_result es_scene_cornell_stack(es_world* world, uint32_t triangles)
     sphere.density = 900;
     sphere.restitution = 0.3f;
     es_body_desc thrown = es_default_body_desc();
-    thrown.velocity = es_v3(-1.9f, 1.4f, -1.75f);
+    thrown.velocity = es_v3(-1.9f, 0.5f, -1.75f);
     es_build_body(&builder, ball, ES_BODY_DYNAMIC, &sphere, &thrown);
 
     es_build_box_camera(&builder);
-    es_build_swaying_spot(&builder, 42, 0.35f, 4);
+    es_build_swaying_spot(&builder, 42, 0.24f, 4);
     return builder.result;
 }

@@ -44,8 +44,8 @@ typedef struct part { uint32_t count; station stations[STATIONS]; es_vec3 side; 
 static const part trunk_and_body[] = {
     {8, {{{0, 0.98f, 0.72f}, 0, 0}, {{0, 0.99f, 0.66f}, 0.22f, 0.24f}, {{0, 0.98f, 0.45f}, 0.34f, 0.37f}, {{0, 0.95f, 0.1f}, 0.39f, 0.40f}, {{0, 0.96f, -0.25f}, 0.37f, 0.39f},
             {{0, 1.0f, -0.5f}, 0.31f, 0.33f}, {{0, 1.02f, -0.66f}, 0.17f, 0.2f}, {{0, 1.02f, -0.7f}, 0, 0}}, {1, 0, 0}, {HIPS, CHEST, HIPS, CHEST}, 40, 36},
-    {7, {{{0, 1.02f, -0.38f}, 0, 0}, {{0, 1.06f, -0.5f}, 0.22f, 0.25f}, {{0, 1.2f, -0.72f}, 0.21f, 0.24f}, {{0, 1.28f, -0.88f}, 0.23f, 0.25f}, {{0, 1.24f, -1.03f}, 0.18f, 0.19f},
-            {{0, 1.15f, -1.13f}, 0.11f, 0.11f}, {{0, 1.12f, -1.15f}, 0, 0}}, {1, 0, 0}, {CHEST, NECK, HEAD, NECK}, 32, 28},
+    {7, {{{0, 1.02f, -0.38f}, 0, 0}, {{0, 1.06f, -0.5f}, 0.22f, 0.25f}, {{0, 1.19f, -0.72f}, 0.21f, 0.24f}, {{0, 1.26f, -0.9f}, 0.22f, 0.22f}, {{0, 1.25f, -1.04f}, 0.17f, 0.17f},
+            {{0, 1.22f, -1.13f}, 0.1f, 0.1f}, {{0, 1.21f, -1.17f}, 0, 0}}, {1, 0, 0}, {CHEST, NECK, HEAD, NECK}, 32, 28},
     {7, {{{0, 1.24f, -1.0f}, 0, 0}, {{0, 1.13f, -1.1f}, 0.11f, 0.11f}, {{0, 0.85f, -1.25f}, 0.085f, 0.08f}, {{0, 0.5f, -1.31f}, 0.06f, 0.06f}, {{0, 0.3f, -1.26f}, 0.047f, 0.047f},
             {{0, 0.2f, -1.17f}, 0.036f, 0.036f}, {{0, 0.18f, -1.14f}, 0, 0}}, {1, 0, 0}, {HEAD, TRUNK_1, TRUNK_2, TRUNK_3}, 20, 44},
     {5, {{{0, 1.12f, 0.6f}, 0, 0}, {{0, 1.06f, 0.68f}, 0.04f, 0.04f}, {{0, 0.8f, 0.76f}, 0.025f, 0.025f}, {{0, 0.56f, 0.79f}, 0.04f, 0.04f}, {{0, 0.46f, 0.8f}, 0, 0}},
@@ -105,9 +105,7 @@ static void skin_surface(const void* parameters, float u, float v, es_vec3* posi
     }
     es_vec3 du = es_v3_sub(skin_point(p, u + h, v), skin_point(p, u - h, v));
     es_vec3 dv = es_v3_sub(skin_point(p, u, es_minf(v + h, 1)), skin_point(p, u, es_maxf(v - h, 0)));
-    es_vec3 axis = station_at(p, v).at;
-    *normal = es_v3_normalize(es_v3_cross(du, dv), es_v3_sub(*position, axis));
-    if (es_v3_dot(*normal, es_v3_sub(*position, axis)) < 0) *normal = es_v3_scale(*normal, -1);
+    *normal = es_v3_normalize(es_v3_cross(du, dv), es_v3_sub(*position, station_at(p, v).at)); /* outwards: across × forward = side */
 }
 
 /* Inverse sixth power of the distance to the bone. */
