@@ -32,6 +32,7 @@ static void capsule_surface(const void* parameters, float u, float v, es_vec3* p
     const capsule* c = parameters;
     float sine, cosine, around_sine, around_cosine;
     es_sincos(ES_PI * v, &sine, &cosine);
+    if (v == 1) sine = 0; /* a pole is one point */
     es_sincos(6.2831853f * u, &around_sine, &around_cosine);
     *normal = es_v3(sine * around_sine, -cosine, sine * around_cosine);
     *position = es_v3_scale(*normal, c->radius);
