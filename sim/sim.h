@@ -387,6 +387,38 @@ typedef struct es_contact_event {
 } es_contact_event;
 ES_API const es_contact_event* es_world_contact_events(const es_world* world, size_t* count);
 
+/* ---- asking where bodies are --------------------------------------------------------------------------------------------------------------------- */
+
+/* Against the shapes as they stand after the last fixed step (sensors too), those of whose categories one is in `mask` (0: all). World
+ * coordinates. Several threads may ask while nothing changes the world. */
+
+typedef struct es_ray_contact {
+    es_body body;
+    uint32_t shape;           /* index into its desc's shapes */
+    uint32_t triangle;        /* of a mesh shape's mesh; else 0 */
+    float distance;           /* m, along the ray */
+    es_vec3 normal;           /* of the surface, towards the ray's origin */
+    double point[3];
+} es_ray_contact;
+/* The first shape met within `max` metres; of equally near ones that of the lower body. The direction need not be unit. A ray that begins
+ * inside a convex shape meets it at distance 0. False when there is none, or (with a message) when an argument is out of range. */
+ES_API bool es_world_cast_ray(const es_world* world, const double origin[3], es_vec3 direction, float max, uint32_t mask, es_ray_contact* contact);
+
+typedef struct es_closest {
+    es_body body;
+    uint32_t shape, triangle; /* as above */
+    float distance;           /* m; negative: the point is so deep inside the shape */
+    es_vec3 normal;           /* of the surface there; of a mesh: towards the point asked from */
+    double point[3];          /* on the surface */
+} es_closest;
+/* The nearest surface within max_distance; inside of shapes the one that holds the point most deeply. False: as above. */
+ES_API bool es_world_closest_point(const es_world* world, const double point[3], float max_distance, uint32_t mask, es_closest* closest);
+
+/* The bodies that a shape touches or overlaps at a place, in slot order. *count is the capacity in, the number of bodies out (it may be larger);
+ * bodies NULL asks for it. The desc's own position and rotation count, its filter and materials do not. A mesh is refused. */
+ES_API es_result es_world_overlap(es_world* world, const es_shape_desc* shape, const double position[3], es_quat rotation, uint32_t mask,
+    es_body* bodies, size_t* count);
+
 /* ---- joints between bodies --------------------------------------------------------------------------------------------------------------------- */
 
 typedef struct es_joint { uint32_t id; } es_joint;
