@@ -100,7 +100,8 @@ bench_child bench_run_child(const char* const* arguments, const char* variable, 
 typedef enum bench_peer_kind {
     BENCH_LLVMPIPE,    /* its programs for drawing, shading and starting */
     BENCH_EMBREE_RAYS, /* building and tracing rays: rows as "primary intersect1 70k" */
-    BENCH_EMBREE_PATHS /* one diffuse bounce by path tracing, demos/bench_embree_paths.c */
+    BENCH_EMBREE_PATHS, /* one diffuse bounce by path tracing, demos/bench_embree_paths.c */
+    BENCH_BULLET        /* rigid bodies */
 } bench_peer_kind;
 typedef struct bench_peer {
     bench_peer_kind kind;
@@ -136,6 +137,9 @@ size_t bench_error_rows(bench_row* rows, size_t capacity);
 /* bench_scale.c */
 int bench_scale(const bench_options* options);
 size_t bench_scale_rows(bench_row* rows, size_t capacity);
+/* bench_dynamics.c */
+int bench_dynamics(const bench_options* options);
+size_t bench_dynamics_rows(bench_row* rows, size_t capacity);
 /* bench_ledger.c */
 int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */

@@ -15,7 +15,7 @@ endif()
 set(demo_compiler "${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}")
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 
-set(demo_sources bench.c bench_child.c bench_error.c bench_error_embree.c bench_error_measure.c bench_error_reference.c bench_error_report.c bench_error_table.c
+set(demo_sources bench.c bench_child.c bench_dynamics.c bench_error.c bench_error_embree.c bench_error_measure.c bench_error_reference.c bench_error_report.c bench_error_table.c
   bench_ledger.c bench_page.c bench_peer.c bench_plot.c bench_rays.c bench_report.c bench_scale.c bench_speed.c bench_speed_errors.c bench_table.c
   canvas.c compare.c fly_camera.c font.c image_layer.c ledger_pictures.c ledger_split.c machine.c main.c messages.c options.c output.c overlay.c play.c play_files.c
   player_capture.c player_commands.c player_graphs.c player_hand.c player_history.c player_panels.c player_scene.c player_settings.c player_split.c
