@@ -77,7 +77,8 @@ void es_body_position(const es_body_object* body, const double centre[3], es_qua
 
 es_pose es_body_pose(const es_body_object* body, const double origin[3])
 {
-    es_vec3 offset = es_quat_rotate(body->rotation, body->local_centre);
+    es_vec3 offset = body->local_centre;
+    if (offset.x != 0 || offset.y != 0 || offset.z != 0) offset = es_quat_rotate(body->rotation, offset);
     return (es_pose){es_v3((float)(body->centre[0] - origin[0]) - offset.x, (float)(body->centre[1] - origin[1]) - offset.y,
                          (float)(body->centre[2] - origin[2]) - offset.z),
         body->rotation};

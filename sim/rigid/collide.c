@@ -82,6 +82,10 @@ uint32_t es_rigid_collide(const es_rigid_shape* a, const es_pose* pose_a, const 
 {
     if (capacity == 0) return 0;
     if (a->type == ES_SHAPE_BOX && b->type == ES_SHAPE_BOX && a->radius + b->radius == 0) {
+        /* too far apart for any rotation */
+        es_vec3 d = es_v3_sub(pose_b->position, pose_a->position);
+        float reach = a->outer_radius + b->outer_radius + margin;
+        if (es_v3_dot(d, d) > reach * reach) return 0;
         es_placed_box box_a = es_place_box(a, pose_a), box_b = es_place_box(b, pose_b);
         return es_collide_boxes(&box_a, &box_b, margin, manifolds);
     }

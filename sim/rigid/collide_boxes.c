@@ -137,7 +137,13 @@ uint32_t es_collide_boxes(const es_placed_box* a, const es_placed_box* b, float 
     }
     if (best_b > margin) return 0;
 
-    float best_edge = -3e38f, length_edge = 1, side_edge = 1;
+    /* The first box's faces are preferred to the second's and faces to edges, unless those are clearly better: more points, and no flicker
+     * between nearly equal axes. */
+    const float slack = 1e-3f * es_minf(es_minf(h[0], es_minf(h[1], h[2])), es_minf(g[0], es_minf(g[1], g[2])));
+    const bool use_b = best_b > best_a + 0.05f * es_absf(best_a) + slack;
+    const float best_face = use_b ? best_b : best_a, to_beat = best_face + 0.05f * es_absf(best_face) + slack;
+
+    float best_edge = to_beat, length_edge = 1, side_edge = 1;
     int edge_i = -1, edge_j = 0;
     for (int i = 0; i < 3; i++) {
         const int i1 = i == 2 ? 0 : i + 1, i2 = i == 0 ? 2 : i - 1;
@@ -147,7 +153,9 @@ uint32_t es_collide_boxes(const es_placed_box* a, const es_placed_box* b, float 
             if (squared < 1e-4f) continue;
             float along = t[i2] * c[i1][j] - t[i1] * c[i2][j];
             float reach = h[i1] * m[i2][j] + h[i2] * m[i1][j] + g[j1] * m[i][j2] + g[j2] * m[i][j1];
-            float over = es_absf(along) - reach, length = es_sqrt(squared), s = over / length;
+            float over = es_absf(along) - reach;
+            if (over <= 0 && over <= to_beat) continue; /* divided by a length below one it only falls */
+            float length = es_sqrt(squared), s = over / length;
             if (s > margin) return 0;
             if (s > best_edge) {
                 best_edge = s;
@@ -159,12 +167,7 @@ uint32_t es_collide_boxes(const es_placed_box* a, const es_placed_box* b, float 
         }
     }
 
-    /* The first box's faces are preferred to the second's and faces to edges, unless those are clearly better: more points, and no flicker
-     * between nearly equal axes. */
-    const float slack = 1e-3f * es_minf(es_minf(h[0], es_minf(h[1], h[2])), es_minf(g[0], es_minf(g[1], g[2])));
-    bool use_b = best_b > best_a + 0.05f * es_absf(best_a) + slack;
-    float best_face = use_b ? best_b : best_a;
-    if (edge_i >= 0 && best_edge > best_face + 0.05f * es_absf(best_face) + slack) {
+    if (edge_i >= 0) {
         const int i = edge_i, j = edge_j, i1 = i == 2 ? 0 : i + 1, i2 = i == 0 ? 2 : i - 1;
         float n[3] = {0}, scale = side_edge / length_edge; /* e_i × c_j, towards the second box */
         n[i1] = -c[i2][j] * scale;
