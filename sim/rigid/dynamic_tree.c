@@ -257,8 +257,7 @@ void es_dynamic_tree_query(const es_dynamic_tree* tree, es_tree_box box, uint32_
     }
 }
 
-/* Where the ray enters the box, or 3e38 when it misses within [0, max]. A direction of zero along an axis gives infinities of the right
- * sign, and NaN only where the origin lies in a side's plane: NaN loses every comparison, which counts as within. */
+/* Where the ray enters the box, or 3e38 when it misses within [0, max]. */
 static float entry(const es_tree_box* box, const float origin[3], const float inverse[3], float max)
 {
     const float *low = &box->low.x, *high = &box->high.x;
@@ -282,8 +281,8 @@ typedef struct pending { uint32_t node; float at; } pending;
 void es_dynamic_tree_ray(const es_dynamic_tree* tree, es_vec3 o, es_vec3 d, float max, uint32_t mask, es_tree_ray_found found, void* user)
 {
     const float origin[3] = {o.x, o.y, o.z};
-    /* never an infinity: a tiny direction stands for none */
-    const float inverse[3] = {1 / (es_absf(d.x) > 1e-30f ? d.x : 1e-30f), 1 / (es_absf(d.y) > 1e-30f ? d.y : 1e-30f), 1 / (es_absf(d.z) > 1e-30f ? d.z : 1e-30f)};
+    /* never an infinity, not even times a distance: a tiny direction stands for none */
+    const float inverse[3] = {1 / (es_absf(d.x) > 1e-20f ? d.x : 1e-20f), 1 / (es_absf(d.y) > 1e-20f ? d.y : 1e-20f), 1 / (es_absf(d.z) > 1e-20f ? d.z : 1e-20f)};
     pending stack[STACK];
     uint32_t depth = 0;
     if (tree->root != ES_NO_PROXY) stack[depth++] = (pending){tree->root, entry(&tree->nodes[tree->root].fat, origin, inverse, max)};

@@ -177,7 +177,7 @@ static bool march(const es_rigid_shape* shape, es_vec3 o, es_vec3 d, float max, 
         }
         /* nothing is nearer in the half space behind the plane at the nearest point: go to where the ray meets that plane */
         float closing = -es_v3_dot(hit->normal, d);
-        if (!(closing > 0)) return false;
+        if (!(closing * (max - t) >= hit->distance)) return false;
         t += hit->distance / closing;
         if (!(t <= max)) return false;
     }
