@@ -321,7 +321,7 @@ ES_API es_result es_world_destroy_mover(es_world* world, es_mover mover);
  * (2024), section Soft Step, in three dimensions. Lengths in metres, masses in kilograms; made for bodies of 0.01 … 100 m and
  * up to 500 m/s. Centres are kept in double, so a pile far from zero behaves like one at zero.
  *
- * What is survived: any dt that es_world_step takes; masses 1:1000 apart (a heavy body on a light one sinks in by some of the contact's softness);
+ * What is survived: any dt that es_world_step takes; masses 1:1000 apart (beyond 1:100 a heavy body crushes a light one; more substeps hold more);
  * bodies that begin deep inside each other (pushed apart at 3 m/s at most). What is refused, with a message: numbers that are not finite,
  * negative mass or density, shapes without volume where mass is asked of them. Speeds are limited to 1000 m/s, and to a turn by half a
  * circle per step. */
@@ -442,8 +442,9 @@ typedef struct es_joint_desc {
     bool motor;               /* HINGE: turns at `speed` (b relative to a, rad/s) as far as `max_torque` (N m) allows; DISTANCE: grows at `speed` m/s with `max_force` */
     float speed;
     float length;             /* DISTANCE, m; negative: as they are when the joint is made */
-    float hertz, damping_ratio; /* softness: cycles per second of the spring, 1 is critical. hertz 0: rigid; HINGE: about its axis, to angle 0;
-                                 * MOTOR: 0 is no spring, the velocities below drive */
+    /* Softness: cycles per second of the spring, 1 is critical. hertz 0: rigid; HINGE: about its axis, to angle 0; MOTOR: no spring, the
+     * velocities below drive */
+    float hertz, damping_ratio;
     es_vec3 velocity, angular_velocity; /* MOTOR: of b relative to a, in a's frame */
     float max_force, max_torque; /* N, N m, 0 … 1e12 */
     float break_force, break_torque; /* above them the joint stops to hold, once and for all; 0: never */

@@ -47,10 +47,12 @@ static void momentum_is_kept(void** unused)
             /* spin, by the inertia of a box or ball */
             es_vec3 w = s.angular_velocity;
             double spin[3] = {w.x, w.y, w.z}, q[4] = {s.rotation.x, s.rotation.y, s.rotation.z, s.rotation.w};
-            double e[3] = {0.5, 0.3, 0.2}, r[3][3] = {
-                {1 - 2 * (q[1] * q[1] + q[2] * q[2]), 2 * (q[0] * q[1] - q[2] * q[3]), 2 * (q[0] * q[2] + q[1] * q[3])},
-                {2 * (q[0] * q[1] + q[2] * q[3]), 1 - 2 * (q[0] * q[0] + q[2] * q[2]), 2 * (q[1] * q[2] - q[0] * q[3])},
-                {2 * (q[0] * q[2] - q[1] * q[3]), 2 * (q[1] * q[2] + q[0] * q[3]), 1 - 2 * (q[0] * q[0] + q[1] * q[1])}};
+            double e[3] = {0.5, 0.3, 0.2}, r[3][3];
+            for (int j = 0; j < 3; j++)
+                for (int k = 0; k < 3; k++) {
+                    double cross = j == k ? 0 : q[3 - j - k] * q[3] * ((k - j + 3) % 3 == 1 ? -2 : 2);
+                    r[j][k] = 2 * q[j] * q[k] + cross + (j == k ? q[3] * q[3] * 2 - 1 : 0);
+                }
             for (int k = 0; k < 3; k++) {
                 double inertia = i == 1 ? 0.4 * m * 0.16 : m / 3 * (e[(k + 1) % 3] * e[(k + 1) % 3] + e[(k + 2) % 3] * e[(k + 2) % 3]);
                 double local = r[0][k] * spin[0] + r[1][k] * spin[1] + r[2][k] * spin[2];
