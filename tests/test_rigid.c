@@ -7,7 +7,7 @@ static void a_stack_rests(void** unused)
     add_floor(&a);
     es_body boxes[10];
     for (int i = 0; i < 10; i++) boxes[i] = add_box(&a, 0.5f, 0, 0.5 + i, 0);
-    step(&a, 120);
+    step(&a, 300);
     for (int i = 0; i < 10; i++) {
         es_body_state s = state_of(&a, boxes[i]);
         assert_true(length_of(s.velocity) < 0.005);
@@ -141,7 +141,7 @@ static void far_from_zero_it_is_the_same(void** unused)
         es_shape_desc slab = box_shape(10, 1, 10);
         add_body(&a, ES_BODY_STATIC, &slab, x, -1, x, no_turn);
         es_body boxes[6];
-        for (int i = 0; i < 6; i++) boxes[i] = add_box(&a, 0.25f, x + 0.1 * i, 0.3 + 0.55 * i, x);
+        for (int i = 0; i < 6; i++) boxes[i] = add_box(&a, 0.25f, x + 0.03125 * i, 0.25 + 0.5 * i, x);
         step(&a, 60);
         for (int i = 0; i < 6; i++) heights[far][i] = state_of(&a, boxes[i]).position[1];
         free_arena(&a);
@@ -255,6 +255,34 @@ static void extremes_are_survived(void** unused)
     }
 }
 
+/* 500 m/s are 8 m per step; walls are 2 cm thick, or triangles. */
+static void fast_bodies_do_not_pass_walls(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    const float corners[12] = {0, -50, -50, 0, -50, 50, 0, 50, 50, 0, 50, -50};
+    const uint32_t triangles[6] = {0, 1, 2, 0, 2, 3};
+    es_mesh mesh;
+    assert_int_equal(es_world_add_mesh(a.world, &(es_mesh_desc){.vertex_count = 4, .triangle_count = 2, .positions = corners, .indices = triangles}, &mesh), ES_OK);
+    es_shape_desc wall = box_shape(0.01f, 50, 50), sheet = es_default_shape_desc();
+    sheet.type = ES_SHAPE_MESH;
+    sheet.mesh = mesh;
+    add_body(&a, ES_BODY_STATIC, &wall, -20, 0, 0, no_turn);
+    add_body(&a, ES_BODY_STATIC, &sheet, 20, 0, 0, no_turn);
+    es_shape_desc ball = ball_shape(0.05f), box = box_shape(0.1f, 0.02f, 0.05f);
+    es_body bodies[24];
+    for (int i = 0; i < 24; i++) {
+        bodies[i] = add_body(&a, ES_BODY_DYNAMIC, i % 2 ? &ball : &box, 0.013 * i, 4 * (i - 12), 0, no_turn);
+        float speed = (i % 4 < 2 ? 1.0f : -1.0f) * (100.0f + 400.0f * (float)i / 23.0f);
+        assert_int_equal(es_world_set_body_velocity(a.world, bodies[i], (es_vec3){speed, 0, 0.05f * speed}, (es_vec3){4, -7, 10}), ES_OK);
+    }
+    for (int k = 0; k < 60; k++) {
+        step(&a, 1);
+        for (int i = 0; i < 24; i++) assert_true(fabs(state_of(&a, bodies[i]).position[0]) < 20.02); /* what spins may be half a thickness in */
+    }
+    free_arena(&a);
+}
+
 /* A body that turns freely about no axis of its own keeps its angular momentum's energy bound, for minutes. */
 static void free_rotation_gains_nothing(void** unused)
 {
@@ -329,6 +357,7 @@ int main(void)
         cmocka_unit_test(events_tell_who_meets_and_parts),
         cmocka_unit_test(bad_input_is_refused),
         cmocka_unit_test(extremes_are_survived),
+        cmocka_unit_test(fast_bodies_do_not_pass_walls),
         cmocka_unit_test(free_rotation_gains_nothing),
         cmocka_unit_test(nodes_and_bodies_move_together),
     };

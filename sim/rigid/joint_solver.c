@@ -359,7 +359,7 @@ void es_joints_solve(es_world* world, const es_solver_job* job, bool push)
 
 #define HAND_HERTZ 6.0f
 #define HAND_DAMPING 1.0f
-#define HAND_TWIST 0.01f /* torque against turning, per newton of a hand's force and metre of the body's reach */
+#define HAND_TWIST 0.001f /* torque against turning, per newton of a hand's force and metre of the body's reach */
 
 uint32_t es_hand_solver_count(const es_world* world)
 {

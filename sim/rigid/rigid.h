@@ -172,6 +172,9 @@ bool es_sort_contacts(es_world* world);
 /* After a step: islands that have been still long enough fall asleep. */
 bool es_islands_sleep(es_world* world, float h);
 
+/* continuous.c: between the solver and the boxes */
+void es_stop_fast_bodies(es_world* world);
+
 /* solver.c: forces, contacts and joints over h, in so many substeps. False after es_fail, with nothing moved. */
 bool es_solve(es_world* world, float h, uint32_t substeps);
 void es_solver_free(es_context* context, struct es_solver* solver);

@@ -202,6 +202,7 @@ es_result es_rigid_step(es_world* world, float h, uint32_t substeps)
     bool good = touch(world) && es_solve(world, h, substeps);
     swap_kinematic(world);
     if (!good) return es_context_last_result(world->context);
+    es_stop_fast_bodies(world);
     refresh_boxes(world, h);
     return es_islands_sleep(world, h) ? ES_OK : es_context_last_result(world->context);
 }
