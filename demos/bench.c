@@ -41,6 +41,7 @@ static const benchmark benchmarks[] = {
     {"scale", bench_scale, bench_scale_rows, false},
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},
+    {"moving", bench_moving, bench_moving_rows, false},
     {"rays", bench_rays, bench_rays_rows, false},
     {"dynamics", bench_dynamics, bench_dynamics_rows, false},
 };

@@ -131,6 +131,8 @@ size_t bench_rays_rows(bench_row* rows, size_t capacity);
 /* bench_speed.c, bench_speed_errors.c */
 int bench_speed(const bench_options* options);
 int bench_frame(const bench_options* options);
+int bench_moving(const bench_options* options);
+size_t bench_moving_rows(bench_row* rows, size_t capacity);
 /* bench_error.c, bench_error_report.c */
 int bench_error(const bench_options* options);
 size_t bench_error_rows(bench_row* rows, size_t capacity);

@@ -15,11 +15,8 @@ endif()
 set(demo_compiler "${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}")
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 
-set(demo_sources bench.c bench_child.c bench_dynamics.c bench_error.c bench_error_embree.c bench_error_measure.c bench_error_reference.c bench_error_report.c bench_error_table.c
-  bench_ledger.c bench_page.c bench_peer.c bench_plot.c bench_rays.c bench_report.c bench_scale.c bench_speed.c bench_speed_errors.c bench_table.c
-  canvas.c compare.c fly_camera.c font.c image_layer.c ledger_pictures.c ledger_split.c machine.c main.c messages.c options.c output.c overlay.c play.c play_files.c
-  player_capture.c player_commands.c player_graphs.c player_hand.c player_history.c player_panels.c player_scene.c player_settings.c player_split.c
-  plot_bars.c plot_curves.c plot_svg.c reference.c render.c session.c setting_slider.c settings.c text.c ui.c ui_focus.c ui_plot.c ui_widgets.c)
+file(GLOB demo_sources RELATIVE ${CMAKE_SOURCE_DIR}/demos CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/demos/*.c)
+list(REMOVE_ITEM demo_sources embed.c)
 list(TRANSFORM demo_sources PREPEND ${CMAKE_SOURCE_DIR}/demos/)
 
 # earthshine_program(TARGET NAME LIBRARY FLAGS…): one program over one build of the library.
