@@ -34,6 +34,10 @@ typedef struct es_filter_scratch {
     float depth[ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS];
     float normal[3][ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS];
     float mid[6][ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS];
+    /* per eight columns: does every pair of taps that a window of this line takes from it pass both tests; and how many lines, this one the
+     * last, have normals that pass with each other's */
+    bool even[ES_FILTER_STRIDE / 8];
+    uint8_t like[ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS / 8];
 } es_filter_scratch;
 
 #endif
