@@ -16,7 +16,7 @@ set(demo_compiler "${CMAKE_C_COMPILER_ID} ${CMAKE_C_COMPILER_VERSION}")
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 
 file(GLOB demo_sources RELATIVE ${CMAKE_SOURCE_DIR}/demos CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/demos/*.c)
-list(REMOVE_ITEM demo_sources embed.c)
+list(REMOVE_ITEM demo_sources embed.c bench_embree_paths.c bench_start_peer.c) # the latter two are built beside a peer
 list(TRANSFORM demo_sources PREPEND ${CMAKE_SOURCE_DIR}/demos/)
 
 # earthshine_program(TARGET NAME LIBRARY FLAGS…): one program over one build of the library.

@@ -1,5 +1,5 @@
 /* See piles.h. */
-#include "demos/piles.h"
+#include "piles.h"
 
 #include <math.h>
 
