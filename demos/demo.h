@@ -39,6 +39,8 @@ typedef struct demo_options {
     const char* sets[DEMO_MAX_SETS]; /* key=value */
     size_t set_count;
     const char* stats;
+    const char *record, *replay; /* files */
+    const char* recorded_settings; /* of the file that is replayed: key=value between blanks, in place of the scene's own; NULL */
     bool reference; /* the command is `reference`; the texts below are values of its settings, NULL when not given */
     const char *spp, *seconds, *error, *bounces;
     const char* resume; /* file */
@@ -54,6 +56,18 @@ int demo_parse_size(const char* text, uint32_t* width, uint32_t* height);
 int demo_parse_frames(const char* text, uint32_t* first, uint32_t* end);
 const char* demo_method_name(uint32_t method);
 
+/* ---- text that grows (text.c) ------------------------------------------------------------------------------------ */
+
+typedef struct demo_text {
+    char* bytes;
+    size_t size, capacity;
+    bool failed;
+} demo_text;
+void demo_text_add(demo_text* text, const char* format, ...) ES_PRINTF(2, 3);
+/* With the quotation marks and JSON's escapes. */
+void demo_text_add_json_string(demo_text* text, const char* string);
+void demo_text_free(demo_text* text);
+
 /* ---- settings (settings.c) --------------------------------------------------------------------------------------- */
 
 /* The scene's own settings, then --size, --gi, --no-skip and every --set. One of `renderer` and `reference` is NULL: its settings are refused. */
@@ -62,6 +76,8 @@ int demo_apply_settings(es_context* context, const demo_options* options, es_wor
 /* What es_scene_settings recommends, over what the structs hold; `renderer` or `reference` is NULL, and what is not theirs is left out. */
 int demo_apply_scene_settings(es_context* context, const char* scene, es_world_settings* world, es_renderer_settings* renderer,
     es_reference_settings* reference);
+/* Adds " key=value" for each setting that is not its default, but for the picture's size. */
+void demo_text_add_settings(demo_text* text, const es_world_settings* world, const es_renderer_settings* renderer);
 int demo_settings(int count, char** arguments);
 int demo_scenes(int count, char** arguments);
 int demo_images(int count, char** arguments);
@@ -75,6 +91,8 @@ typedef struct demo_session {
     es_world* world;
     es_renderer* renderer;
     es_renderer_settings settings;
+    es_recording *recording, *replay; /* being made; being done again */
+    char difference[160];             /* how the replay differs from the recording */
 } demo_session;
 
 int demo_session_open(const demo_options* options, demo_session* session);
@@ -83,6 +101,20 @@ int demo_session_open_context(const demo_options* options, demo_session* session
 void demo_session_close(demo_session* session);
 /* Brings the world to frame `frame`, which lies at frame / fps seconds: the first call begins at 0. */
 int demo_session_step(demo_session* session, uint32_t frame, double fps);
+
+/* ---- recordings (recording.c) ------------------------------------------------------------------------------------- */
+
+/* From the next step on. `window`: the world has the player's nodes. */
+int demo_record_begin(demo_session* session, const char* scene, bool window);
+/* Writes what was recorded; nothing when nothing was. */
+int demo_record_end(demo_session* session, const char* path);
+/* Loads options->replay; scene and recorded settings become the options'. */
+int demo_replay_load(demo_session* session, demo_options* options);
+/* After the world is opened: adds what the recorded one had, and goes to where the recording begins. */
+int demo_replay_begin(demo_session* session);
+bool demo_recorded_in_window(const es_recording* recording);
+/* DEMO_EXCEEDED after a line that says where it differs. */
+int demo_replay_step(demo_session* session, uint32_t step);
 
 /* ---- output (output.c) ------------------------------------------------------------------------------------------- */
 
@@ -108,18 +140,6 @@ int demo_write_text(const char* path, const char* text, size_t size);
  * without a name those of the main image where there is one. An image alone in its file is kept as it is. Refuses a name that the
  * file does not have, and says which it has. */
 int demo_select_layer(es_context* context, es_image* image, const char* path, const char* name);
-
-/* ---- text that grows (text.c) ------------------------------------------------------------------------------------ */
-
-typedef struct demo_text {
-    char* bytes;
-    size_t size, capacity;
-    bool failed;
-} demo_text;
-void demo_text_add(demo_text* text, const char* format, ...) ES_PRINTF(2, 3);
-/* With the quotation marks and JSON's escapes. */
-void demo_text_add_json_string(demo_text* text, const char* string);
-void demo_text_free(demo_text* text);
 
 /* ---- machine (machine.c) ----------------------------------------------------------------------------------------- */
 

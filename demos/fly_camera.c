@@ -27,18 +27,25 @@ int fly_camera_reset(fly_camera* fly, es_world* world)
     return es_world_set_active_camera(world, fly->flying ? fly->own : fly->scenes) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
 }
 
-/* Takes position and direction from the scene's camera as it is now, roll left out. */
-static void take_over(fly_camera* fly, es_world* world)
+/* Takes position and direction from a camera as it is now, roll left out. */
+static void take_over(fly_camera* fly, es_world* world, es_camera from)
 {
     es_camera_desc camera;
     es_mat4 pose;
-    if (es_world_get_camera(world, fly->scenes, &camera) == ES_OK &&
+    if (es_world_get_camera(world, from, &camera) == ES_OK &&
         es_world_get_node_matrix(world, camera.node, &pose) == ES_OK) {
         fly->position = (es_vec3){pose.m[12], pose.m[13], pose.m[14]};
         fly->yaw = atan2f(pose.m[8], pose.m[10]);
         fly->pitch = atan2f(-pose.m[9], hypotf(pose.m[8], pose.m[10]));
     }
     fly->flying = true;
+}
+
+void fly_camera_adopt(fly_camera* fly, es_world* world)
+{
+    bool own = es_world_active_camera(world).id == fly->own.id;
+    if (own) take_over(fly, world, fly->own);
+    fly->flying = own;
 }
 
 int fly_camera_place(fly_camera* fly, es_world* world)
@@ -67,7 +74,7 @@ int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* i
         tilt -= input->mouse_dy * 0.005f;
     }
     if (ahead == 0 && right == 0 && up == 0 && turn == 0 && tilt == 0) return DEMO_OK;
-    if (!fly->flying) take_over(fly, world);
+    if (!fly->flying) take_over(fly, world, fly->scenes);
     fly->yaw = remainderf(fly->yaw + turn, 6.2831853f);
     fly->pitch = fminf(fmaxf(fly->pitch + tilt, -1.55f), 1.55f);
     float step = fly->speed * seconds * (input->down[ES_KEY_SHIFT] ? 4.0f : 1.0f);

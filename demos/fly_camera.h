@@ -18,6 +18,8 @@ int fly_camera_init(fly_camera* fly, es_world* world);
 int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* input, float seconds);
 /* Puts the world's camera where this one is: after the world was wound back. */
 int fly_camera_place(fly_camera* fly, es_world* world);
+/* Takes over from wherever the world's camera is, ours or the scene's: after a replay. */
+void fly_camera_adopt(fly_camera* fly, es_world* world);
 int fly_camera_reset(fly_camera* fly, es_world* world);
 
 #endif

@@ -18,6 +18,8 @@ static const char usage[] =
     "             --image NAME                          which image (default: display)\n"
     "             --hash                                prints `frame N NAME HASH` per frame\n"
     "             --stats FILE.json                     milliseconds and counts per frame and pass\n"
+    "             --record FILE                         keeps what happens: each step, what was done before it, hashes\n"
+    "             --replay FILE                         does it again; exit 1 and the first step and object that differ\n"
     "  earthshine reference SCENE|FILE --out FILE.exr   the truth by path tracing; any image format, .exr with all layers\n"
     "             --spp N --seconds S --error E         when to stop: samples per pixel, time, relRMSE by its own\n"
     "                                                   estimate; whichever comes first (256 samples when none is given)\n"

@@ -84,13 +84,13 @@ static int parse_method(const char* text, demo_options* options)
     return demo_refuse("--gi %s: none, ism, classic, vpl-traced or vpl-sampled is expected", text);
 }
 
-enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
+enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, RECORD, REPLAY, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
 static const char* const option_names[OPTION_COUNT] = {"--out", "--size", "--frames", "--fps", "--threads", "--isa", "--no-skip", "--gi", "--set",
-    "--image", "--hash", "--stats", "--spp", "--seconds", "--error", "--bounces", "--resume"};
+    "--image", "--hash", "--stats", "--record", "--replay", "--spp", "--seconds", "--error", "--bounces", "--resume"};
 
 static bool belongs_to(enum option_id id, bool reference)
 {
-    if (id == NO_SKIP || id == GI) return !reference;
+    if (id == NO_SKIP || id == GI || id == RECORD || id == REPLAY) return !reference;
     return id < SPP || reference;
 }
 
@@ -135,6 +135,12 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
         return DEMO_OK;
     case STATS:
         options->stats = value;
+        return DEMO_OK;
+    case RECORD:
+        options->record = value;
+        return DEMO_OK;
+    case REPLAY:
+        options->replay = value;
         return DEMO_OK;
     case SPP:
         options->spp = value;
@@ -195,5 +201,6 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
         }
         if (apply_option((enum option_id)id, value, options) != DEMO_OK) return DEMO_BAD_INPUT;
     }
+    if (options->record && options->replay) return demo_refuse("%s: --record and --replay exclude each other", command);
     return DEMO_OK;
 }

@@ -97,12 +97,42 @@ static float next_step(player* p, float elapsed)
     return p->world.step;
 }
 
+/* As many recorded steps as the time that has passed holds; a paused replay makes one when asked to. */
+static int advance_replay(player* p, float elapsed)
+{
+    uint32_t end = es_recording_steps(p->session.replay), wanted = p->paused ? p->steps : UINT32_MAX;
+    p->steps = 0;
+    p->replay_time = fminf(p->replay_time + (p->paused ? 0 : elapsed), 0.2f);
+    while (wanted-- && p->replayed < end) {
+        float dt = es_recording_dt(p->session.replay, p->replayed);
+        if (!p->paused && dt > p->replay_time) break;
+        int code = demo_replay_step(&p->session, p->replayed);
+        if (code == DEMO_BAD_INPUT) return code;
+        p->replay_time -= p->paused ? 0 : dt;
+        p->replayed++;
+        history_add(&p->history, p->session.world);
+        if (code != DEMO_EXCEEDED) continue;
+        p->differed = true;
+        player_end_replay(p, p->session.difference);
+        return DEMO_OK;
+    }
+    if (p->replayed == end) player_end_replay(p, "ended as it was recorded");
+    return DEMO_OK;
+}
+
+static int advance_live(player* p, float elapsed)
+{
+    float dt = next_step(p, elapsed);
+    if (player_hand_pull(p) != DEMO_OK || es_world_step(p->session.world, dt) != ES_OK || player_hand_apply(p) != DEMO_OK)
+        return demo_refuse_context(p->session.context);
+    if (dt > 0) history_add(&p->history, p->session.world);
+    return DEMO_OK;
+}
+
 static int advance(player* p, float elapsed)
 {
     es_world* world = p->session.world;
-    float dt = next_step(p, elapsed);
-    if (es_world_step(world, dt) != ES_OK || player_hand_apply(p) != DEMO_OK) return demo_refuse_context(p->session.context);
-    if (dt > 0) history_add(&p->history, world);
+    if ((p->replaying ? advance_replay(p, elapsed) : advance_live(p, elapsed)) != DEMO_OK) return DEMO_BAD_INPUT;
     if (p->input.width && p->input.height && p->input.width <= ES_RASTER_MAX_SIZE && p->input.height <= ES_RASTER_MAX_SIZE) {
         p->session.settings.width = (p->input.width + p->divisor - 1) / p->divisor;
         p->session.settings.height = (p->input.height + p->divisor - 1) / p->divisor;
@@ -128,10 +158,10 @@ static int play_frame(player* p, float elapsed)
     es_window_input input = ui_game_input(&p->ui);
     player_take_keys(p, &input);
     leave_commands(p, &input);
-    bool mouse_taken = player_split_drag(p, &input) || player_hand_update(p, &input);
+    bool mouse_taken = player_split_drag(p, &input) || (!p->replaying && player_hand_update(p, &input));
     if (mouse_taken) memset(input.mouse_down, 0, sizeof input.mouse_down);
     if (p->hand.what && p->hand.by_keyboard) input.down[ES_KEY_LEFT] = input.down[ES_KEY_RIGHT] = input.down[ES_KEY_UP] = input.down[ES_KEY_DOWN] = false;
-    if (fly_camera_update(&p->fly, p->session.world, &input, elapsed) != DEMO_OK) return demo_refuse_context(p->session.context);
+    if (!p->replaying && fly_camera_update(&p->nodes.fly, p->session.world, &input, elapsed) != DEMO_OK) return demo_refuse_context(p->session.context);
     if (advance(p, elapsed) != DEMO_OK || draw(p) != DEMO_OK) return DEMO_BAD_INPUT;
     if (!p->wanted_scene[0]) return DEMO_OK;
     char scene[DEMO_PATH_SIZE];
@@ -177,8 +207,10 @@ int demo_play(int count, char** arguments)
 {
     demo_options options;
     if (demo_parse_options("play", count, arguments, &options) != DEMO_OK) return DEMO_BAD_INPUT;
-    bool chosen = options.scene != NULL;
+    bool chosen = options.scene || options.replay;
+    const demo_options given = options;
     if (!chosen) options.scene = "cornell";
+    if (options.record && demo_check_writable(options.record) != DEMO_OK) return DEMO_BAD_INPUT;
     if (options.out || options.frames_given || options.hash || options.stats) return play_to_files(&options, "");
 
     player* p = calloc(1, sizeof *p);
@@ -188,7 +220,8 @@ int demo_play(int count, char** arguments)
     if (p->show_scenes) ui_focus_on(&p->ui, "scenes");
     es_result opened = ES_OK;
     int code = demo_session_open_context(&options, &p->session);
-    if (code == DEMO_OK) code = player_open_scene(p, options.scene, false);
+    if (code == DEMO_OK && options.replay) code = demo_replay_load(&p->session, &p->options);
+    if (code == DEMO_OK) code = player_open_scene(p, p->options.scene, false);
     if (code == DEMO_OK) {
         es_window_desc desc = {"Earthshine", p->session.settings.width, p->session.settings.height};
         opened = es_window_create(p->session.context, &desc, &p->window);
@@ -197,10 +230,18 @@ int demo_play(int count, char** arguments)
         else if (!without) code = demo_refuse_context(p->session.context);
     }
     if (p->window) es_window_destroy(p->window);
+    if (p->session.recording && !p->window) es_recording_destroy(p->session.recording), p->session.recording = NULL;
     player_close_scene(p);
+    es_recording_destroy(p->session.replay);
+    if (code == DEMO_OK && p->failed) code = DEMO_BAD_INPUT;
+    if (code == DEMO_OK && p->differed) code = DEMO_EXCEEDED;
     if (p->session.context) es_context_destroy(p->session.context);
     free(p->canvas.pixels);
     free(p);
-    if (opened == ES_NO_DISPLAY || opened == ES_NOT_BUILT) return play_to_files(&options, opened == ES_NO_DISPLAY ? "No display here: " : "Built without a window: ");
+    if (opened == ES_NO_DISPLAY || opened == ES_NOT_BUILT) {
+        options = given;
+        if (!chosen) options.scene = "cornell";
+        return play_to_files(&options, opened == ES_NO_DISPLAY ? "No display here: " : "Built without a window: ");
+    }
     return code;
 }

@@ -44,7 +44,7 @@ int play_to_files(const demo_options* given, const char* why)
 {
     demo_options options = *given;
     char directory[DEMO_PATH_SIZE], pattern[DEMO_PATH_SIZE + 128], stem[64], first[DEMO_PATH_SIZE], last[DEMO_PATH_SIZE];
-    if (!options.frames_given) options.end = 60;
+    if (!options.frames_given && !options.replay) options.end = 60; /* a replay has frames of its own */
     if (!options.size_given) {
         options.width = 640; /* sixty frames within a minute on a small machine */
         options.height = 480;
@@ -52,7 +52,7 @@ int play_to_files(const demo_options* given, const char* why)
     }
     if (!options.out) {
         if (choose_frames_directory(directory) != DEMO_OK) return DEMO_BAD_INPUT;
-        play_stem(options.scene, stem);
+        play_stem(options.scene ? options.scene : options.replay, stem);
         snprintf(pattern, sizeof pattern, "%s/%s-%%04d.png", directory, stem);
         for (char* c = pattern; c < pattern + strlen(directory); c++)
             if (*c == '%') return demo_refuse("%s: a directory with a percent sign cannot take frames", directory);
@@ -64,11 +64,17 @@ int play_to_files(const demo_options* given, const char* why)
         return code;
     }
     demo_expand_pattern(options.out, options.first, first);
-    demo_expand_pattern(options.out, options.end - 1, last);
     char* path = realpath(first, NULL);
-    printf("%s%u frame%s of %s rendered: %s%s%s\n", why, options.end - options.first, options.end - options.first > 1 ? "s" : "",
-        options.scene, path ? path : first, options.end - options.first > 1 ? " to " : "",
-        options.end - options.first > 1 ? (strrchr(last, '/') ? strrchr(last, '/') + 1 : last) : "");
+    const char* shown = path ? path : first;
+    if (options.replay && !options.frames_given) {
+        printf("%s%s replayed: %s and so on\n", why, options.replay, shown);
+    } else {
+        uint32_t frames = options.end - options.first;
+        demo_expand_pattern(options.out, options.end - 1, last);
+        const char* name = strrchr(last, '/') ? strrchr(last, '/') + 1 : last;
+        printf("%s%u frame%s of %s rendered: %s%s%s\n", why, frames, frames > 1 ? "s" : "", options.scene ? options.scene : options.replay, shown,
+            frames > 1 ? " to " : "", frames > 1 ? name : "");
+    }
     free(path);
     return DEMO_OK;
 }

@@ -3,12 +3,12 @@
 #define EARTHSHINE_DEMO_PLAYER_H
 
 #include "demo.h"
-#include "fly_camera.h"
 #include "player_history.h"
+#include "player_nodes.h"
 #include "ui_plot.h"
 #include "ui_widgets.h"
 
-enum { PLAYER_MAX_SERIES = 40, PLAYER_MAX_LIGHTS = 16 };
+enum { PLAYER_MAX_SERIES = 40 };
 
 /* The right side of the divider. */
 typedef enum player_split_mode { SPLIT_OFF, SPLIT_FORMER, SPLIT_REFERENCE, SPLIT_MODES } player_split_mode;
@@ -32,7 +32,7 @@ typedef struct player_split {
 } player_split;
 
 typedef struct player_graphs {
-    ui_series frame, flicker, brightness;
+    ui_series frame, flicker, brightness, energy;
     struct { char name[40]; ui_series milliseconds; } passes[PLAYER_MAX_SERIES];
     size_t pass_count;
     float* luminance;            /* of a grid over the last two frames */
@@ -48,16 +48,15 @@ typedef struct player_capture {
 } player_capture;
 
 /* What the mouse or the keyboard holds. */
-typedef enum player_held { HELD_NOTHING, HELD_LIGHT } player_held;
+typedef enum player_held { HELD_NOTHING, HELD_LIGHT, HELD_BODY, HELD_SOFT } player_held;
 typedef struct player_hand {
     player_held what;
     bool by_keyboard;
     es_light light;
     double target[3];            /* where it is pulled to, world coordinates */
     float distance;              /* from the eye, along the view's axis */
-    size_t light_count;          /* lights of the scene that can be moved, each with a node of its own in waiting */
-    struct { es_light light; es_node own, scenes; } lights[PLAYER_MAX_LIGHTS];
     bool show_lights;
+    double cross_until;          /* the middle of the picture is marked until then */
 } player_hand;
 
 typedef struct player {
@@ -73,7 +72,11 @@ typedef struct player {
     demo_canvas canvas;
     size_t canvas_pixels;
     uint32_t divisor;            /* a rendered pixel is so many pixels of the window wide */
-    fly_camera fly;
+    player_nodes nodes;
+    bool replaying;              /* a recording: what there is to do is in it */
+    uint32_t replayed;           /* steps of it */
+    float replay_time;           /* seconds that the next ones may take */
+    bool differed, failed;       /* it went another way; a recording could not be written */
     size_t image;                /* index into the renderer's images; 0 is the displayed one */
     bool paused, quit;
     uint32_t steps;              /* single steps to make */
@@ -102,6 +105,8 @@ void player_notice(player* p, const char* format, ...) ES_PRINTF(2, 3);
 /* Opens p->scene with the options' settings, or with those that are set when `keep` says so. On failure what was open stays. */
 int player_open_scene(player* p, const char* scene, bool keep);
 void player_close_scene(player* p);
+/* Ends the replay where it is: from there on the scene is the user's. */
+void player_end_replay(player* p, const char* why);
 /* The window says which scene it shows. */
 void player_open_title(player* p);
 
@@ -147,14 +152,19 @@ void player_capture_frame(player* p);
 float player_capture_step(const player* p);
 
 /* ---- player_hand.c ---- */
-int player_hand_open(player* p);
 /* The mouse and keys that the interface leaves; true when it has the mouse, which then does not turn the camera. */
 bool player_hand_update(player* p, const es_window_input* input);
-/* After the step: what is held is where the hand is. */
+/* Before the step: a body or cloth is pulled to where the hand is. After it: a light is there. */
+int player_hand_pull(player* p);
 int player_hand_apply(player* p);
 void player_hand_draw(player* p);
 void player_hold_next_light(player* p);
 void player_release(player* p);
+/* By the keyboard, in the middle of the picture: takes hold or lets go, throws what is held, tears cloth, takes it off its hooks. */
+void player_grab(player* p);
+void player_throw(player* p);
+void player_tear(player* p);
+void player_unhook(player* p);
 void player_lights_home(player* p);
 
 /* ---- play_files.c ---- */

@@ -77,19 +77,19 @@ static void wind(player* p, int states)
 {
     player_history* h = &p->history;
     int at = (int)h->at + states;
-    if (!h->count) return;
+    if (!h->count || p->replaying) return;
     p->paused = true;
     p->steps = 0;
     player_release(p);
     if (history_go(h, p->session.world, at < 0 ? 0 : (uint32_t)at) != ES_OK) player_notice(p, "%s", es_context_message(p->session.context));
-    fly_camera_place(&p->fly, p->session.world);
+    fly_camera_place(&p->nodes.fly, p->session.world);
     p->world = es_world_get_settings(p->session.world);
 }
 static void do_back(player* p) { wind(p, -1); }
 static void do_forth(player* p) { wind(p, 1); }
 static void do_start(player* p) { wind(p, -HISTORY_STATES); }
 
-static void do_camera(player* p) { fly_camera_reset(&p->fly, p->session.world); }
+static void do_camera(player* p) { fly_camera_reset(&p->nodes.fly, p->session.world); }
 /* All the light, its direct part, its indirect part. */
 static void do_light_part(player* p)
 {
@@ -130,6 +130,10 @@ static void do_pin(player* p)
 static void do_divider_left(player* p) { p->split.divider = fmaxf(p->split.divider - 0.05f, 0.02f); }
 static void do_divider_right(player* p) { p->split.divider = fminf(p->split.divider + 0.05f, 0.98f); }
 
+static void do_grab(player* p) { player_grab(p); }
+static void do_throw(player* p) { player_throw(p); }
+static void do_tear(player* p) { player_tear(p); }
+static void do_unhook(player* p) { player_unhook(p); }
 static void do_hold_light(player* p) { player_hold_next_light(p); }
 static void do_lights_home(player* p) { player_lights_home(p); }
 static void do_show_lights(player* p) { p->hand.show_lights = !p->hand.show_lights; }
@@ -177,11 +181,16 @@ static const command commands[] = {
     {'C', PLAIN, false, do_normal, "C", "normal speed"},
     {0, PLAIN, false, NULL, NULL, "Camera"},
     {0, PLAIN, false, NULL, "W A S D Q E", "fly, down, up (Shift: faster)"},
-    {0, PLAIN, false, NULL, "drag ↑ ↓ ← →", "look around"},
+    {0, PLAIN, false, NULL, "drag ↑ ↓ ← →", "look around (right: always)"},
     {'R', PLAIN, false, do_camera, "R", "the scene's own camera"},
     {0, PLAIN, false, NULL, NULL, "Hand"},
+    {0, PLAIN, false, NULL, "drag", "grab bodies and cloth, throw them"},
+    {'F', PLAIN, false, do_grab, "F", "grab in the middle, let go"},
+    {ES_KEY_ENTER, PLAIN, false, do_throw, "Enter", "throw what is held"},
+    {'X', CONTROL, false, do_tear, "middle, Ctrl X", "tear cloth"},
+    {'D', CONTROL, false, do_unhook, "Ctrl D", "take cloth off its hooks"},
     {'K', PLAIN, false, do_hold_light, "K", "hold the next light"},
-    {0, PLAIN, false, NULL, "drag ↑ ↓ ← →", "move what is held"},
+    {0, PLAIN, false, NULL, "↑ ↓ ← →", "move what is held"},
     {0, PLAIN, false, NULL, "wheel PgUp PgDn", "nearer, farther"},
     {'J', PLAIN, false, do_show_lights, "J", "show the lights, to drag them"},
     {'J', CONTROL, false, do_lights_home, "Ctrl J", "lights back to their places"},
@@ -227,6 +236,15 @@ bool player_command_text(size_t index, const char** key, const char** text)
     return true;
 }
 
+/* A replay is what was recorded and nothing else. */
+static bool changes_world(const command* c)
+{
+    void (*const all[])(player*) = {do_slower, do_faster, do_normal, do_back, do_forth, do_start, do_camera, do_grab, do_throw, do_tear, do_unhook, do_hold_light, do_lights_home};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        if (c->run == all[i]) return true;
+    return false;
+}
+
 bool player_with_control(const es_window_input* input) { return input->down[ES_KEY_CONTROL] || input->pressed[ES_KEY_CONTROL]; }
 
 void player_take_keys(player* p, const es_window_input* input)
@@ -234,6 +252,7 @@ void player_take_keys(player* p, const es_window_input* input)
     bool control = player_with_control(input);
     for (size_t i = 0; i < COMMAND_COUNT && !p->quit; i++) {
         const command* c = &commands[i];
+        if (p->replaying && changes_world(c)) continue;
         if (c->key && control == (c->with == CONTROL) && (c->repeats ? input->repeated : input->pressed)[c->key]) c->run(p);
     }
     for (size_t i = 0; i < 9 && i < es_image_name_count() && !control; i++)

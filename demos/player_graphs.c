@@ -62,6 +62,42 @@ static float measure_flicker(player* p)
     return mean > 0 ? (float)(sqrt(sum / (double)samples) / (mean / (double)samples)) : 0;
 }
 
+/* ---- bodies --------------------------------------------------------------------------------------------------------------------------------- */
+
+/* Of the bodies' motion (but their spin) and height over the scene's floor, and of cloth's motion, joules: where nothing pushes it may not
+ * rise. NaN without any. */
+static float measure_energy(const player* p)
+{
+    enum { MOST = 4096 };
+    static const es_object_kind kinds[] = {ES_OBJECT_BODY, ES_OBJECT_SOFT};
+    const es_world* world = p->session.world;
+    es_world_settings settings = es_world_get_settings(world);
+    es_vec3 low = {0, 0, 0}, high;
+    uint32_t* ids = malloc(MOST * sizeof *ids);
+    double sum = 0;
+    size_t moving = 0;
+    es_world_bounds(world, &low, &high);
+    for (size_t k = 0; ids && k < sizeof kinds / sizeof kinds[0]; k++) {
+        size_t count = MOST;
+        if (es_world_enumerate(world, kinds[k], ids, &count) != ES_OK) continue;
+        for (size_t i = 0; i < count && i < MOST; i++) {
+            es_body_state body;
+            es_soft_state soft;
+            if (kinds[k] == ES_OBJECT_SOFT) {
+                if (es_world_get_soft_state(world, (es_soft){ids[i]}, &soft) == ES_OK) sum += (double)soft.kinetic_energy, moving++;
+                continue;
+            }
+            if (es_world_get_body(world, (es_body){ids[i]}, &body) != ES_OK || body.type != ES_BODY_DYNAMIC) continue;
+            es_vec3 v = body.velocity, g = settings.gravity;
+            double height = -(double)g.x * (body.centre[0] - (double)low.x) - (double)g.y * (body.centre[1] - (double)low.y) - (double)g.z * (body.centre[2] - (double)low.z);
+            sum += (double)body.mass * (0.5 * (double)(v.x * v.x + v.y * v.y + v.z * v.z) + (double)body.gravity_scale * height);
+            moving++;
+        }
+    }
+    free(ids);
+    return moving ? (float)sum : NAN;
+}
+
 /* ---- all of a frame ------------------------------------------------------------------------------------------------------------------ */
 
 void player_graphs_add(player* p)
@@ -73,8 +109,12 @@ void player_graphs_add(player* p)
         ui_series* series = series_of_pass(g, stats->passes[i].name);
         if (series) ui_series_add(series, stats->passes[i].skipped ? 0 : (float)stats->passes[i].milliseconds);
     }
-    if (p->show_graphs) ui_series_add(&g->flicker, measure_flicker(p));
-    else g->grids = 0;
+    if (!p->show_graphs) {
+        g->grids = 0;
+        return;
+    }
+    ui_series_add(&g->flicker, measure_flicker(p));
+    ui_series_add(&g->energy, measure_energy(p));
 }
 
 /* ---- panel ------------------------------------------------------------------------------------------------------------------------------ */
@@ -136,11 +176,13 @@ void player_graphs_panel(player* p, canvas_rect rect)
     ui* u = &p->ui;
     player_graphs* g = &p->graphs;
     if (!ui_panel_begin(u, "graphs", rect, "Graphs")) p->show_graphs = false;
-    int text = 3 * (u->row + 2 * u->scale) + 8 * FONT_HEIGHT * u->scale, left = rect.y + rect.height - u->y - text - 6 * u->scale;
-    int height = left / 5 > 12 * u->scale ? left / 5 : 12 * u->scale;
+    const int curves = isfinite(ui_series_at(&g->energy, 0)) ? 4 : 3;
+    int text = curves * (u->row + 2 * u->scale) + 8 * FONT_HEIGHT * u->scale, left = rect.y + rect.height - u->y - text - 6 * u->scale;
+    int height = left / (curves + 2) > 12 * u->scale ? left / (curves + 2) : 12 * u->scale;
     plot(p, height, "frame", "%.2f ms", &g->frame, UI_TEXT);
     plot(p, height, "flicker", "%.4f", &g->flicker, colours[3]);
     plot(p, height, "brightness", "%.3f", &g->brightness, colours[1]);
+    if (isfinite(ui_series_at(&g->energy, 0))) plot(p, height, "energy", "%.4g J", &g->energy, colours[2]);
     plot_passes(p, 2 * height);
     ui_panel_end(u);
 }

@@ -1,4 +1,5 @@
-/* What is taken hold of: lights, dragged with the mouse in the plane of the picture or moved with the arrow keys.
+/* What is taken hold of: bodies and cloth, which a hand pulls by a spring and which fly on when they are let go, and lights, which are just
+ * put elsewhere. All are moved in the plane of the picture by the mouse or the arrow keys, and to and fro by the wheel or Page Up and Down.
  *
  * A light that a clip moves would be back in the next step; so one that is dragged moves to a node of its own, made when the scene was
  * opened (what exists must not change, or the past could not be gone back to). */
@@ -6,25 +7,6 @@
 
 #include <math.h>
 #include <string.h>
-
-int player_hand_open(player* p)
-{
-    player_hand* h = &p->hand;
-    uint32_t ids[256];
-    size_t count = sizeof ids / sizeof ids[0];
-    if (es_world_enumerate(p->session.world, ES_OBJECT_LIGHT, ids, &count) != ES_OK) return DEMO_BAD_INPUT;
-    if (count > sizeof ids / sizeof ids[0]) count = sizeof ids / sizeof ids[0];
-    for (size_t i = 0; i < count && h->light_count < PLAYER_MAX_LIGHTS; i++) {
-        es_light_desc desc;
-        es_light light = {ids[i]};
-        es_node_desc node = {.name = "dragged light", .transform = es_identity_transform()};
-        if (es_world_get_light(p->session.world, light, &desc) != ES_OK || es_world_add_node(p->session.world, &node, &h->lights[h->light_count].own) != ES_OK)
-            return DEMO_BAD_INPUT;
-        h->lights[h->light_count].light = light;
-        h->lights[h->light_count++].scenes = desc.node;
-    }
-    return DEMO_OK;
-}
 
 /* ---- between the picture and the world ------------------------------------------------------------------------------------------------ */
 
@@ -80,6 +62,19 @@ static es_vec3 from_pixel(const eye* e, float x, float y, float distance)
     return (es_vec3){(nx + m[8] * distance - m[12]) / m[0], (ny + m[9] * distance - m[13]) / m[5], -distance};
 }
 
+/* The pixel's ray in the world; what is orthographic begins beside the eye. */
+static void pixel_ray(const eye* e, float x, float y, double origin[3], es_vec3* direction)
+{
+    double far[3];
+    bool parallel = e->view.projection.m[11] == 0;
+    to_world(e, parallel ? from_pixel(e, x, y, 0) : (es_vec3){0, 0, 0}, origin);
+    to_world(e, from_pixel(e, x, y, 1), far);
+    float d[3], length = 0;
+    for (int k = 0; k < 3; k++) d[k] = (float)(far[k] - origin[k]), length += d[k] * d[k];
+    length = sqrtf(length);
+    *direction = length > 0 ? (es_vec3){d[0] / length, d[1] / length, d[2] / length} : (es_vec3){0, 0, -1};
+}
+
 /* ---- lights ------------------------------------------------------------------------------------------------------------------------------- */
 
 static bool light_position(const player* p, es_light light, double position[3])
@@ -118,10 +113,10 @@ static es_quat rotation_of(const es_mat4* pose)
     return (es_quat){q[0], q[1], q[2], (r[k][j] - r[j][k]) / s};
 }
 
-static int index_of(const player_hand* h, es_light light)
+static int index_of(const player* p, es_light light)
 {
-    for (size_t i = 0; i < h->light_count; i++)
-        if (h->lights[i].light.id == light.id) return (int)i;
+    for (size_t i = 0; i < p->nodes.light_count; i++)
+        if (p->nodes.lights[i].light.id == light.id) return (int)i;
     return -1;
 }
 
@@ -131,9 +126,9 @@ static void hold_light(player* p, es_light light, bool by_keyboard)
     eye e;
     es_light_desc desc;
     double position[3];
-    int index = index_of(h, light);
+    int index = index_of(p, light);
     if (index < 0 || !look(p, &e) || !light_position(p, light, position) || es_world_get_light(p->session.world, light, &desc) != ES_OK) return;
-    es_node own = h->lights[index].own;
+    es_node own = p->nodes.lights[index].own;
     if (desc.node.id != own.id) {
         es_mat4 pose;
         es_transform transform = es_identity_transform();
@@ -156,32 +151,188 @@ static void hold_light(player* p, es_light light, bool by_keyboard)
 void player_hold_next_light(player* p)
 {
     player_hand* h = &p->hand;
-    int at = h->what == HELD_LIGHT ? index_of(h, h->light) + 1 : 0;
+    int at = h->what == HELD_LIGHT ? index_of(p, h->light) + 1 : 0;
     player_release(p);
     double position[3];
-    for (; at < (int)h->light_count; at++) {
-        if (!light_position(p, h->lights[at].light, position)) continue;
-        hold_light(p, h->lights[at].light, true);
+    for (; at < (int)p->nodes.light_count; at++) {
+        if (!light_position(p, p->nodes.lights[at].light, position)) continue;
+        hold_light(p, p->nodes.lights[at].light, true);
         const char* name = es_world_name(p->session.world, ES_OBJECT_LIGHT, h->light.id);
         player_notice(p, "holding light %d%s%s: arrow keys, Page Up and Down; K next, Esc lets go", at + 1, name && name[0] ? " " : "", name ? name : "");
         return;
     }
-    player_notice(p, h->light_count ? "no further light" : "there is no light to hold");
+    player_notice(p, p->nodes.light_count ? "no further light" : "there is no light to hold");
 }
 
 void player_lights_home(player* p)
 {
-    player_hand* h = &p->hand;
     player_release(p);
-    for (size_t i = 0; i < h->light_count; i++) {
+    for (size_t i = 0; i < p->nodes.light_count; i++) {
         es_light_desc desc;
-        if (es_world_get_light(p->session.world, h->lights[i].light, &desc) != ES_OK || desc.node.id != h->lights[i].own.id) continue;
-        desc.node = h->lights[i].scenes;
-        es_world_set_light(p->session.world, h->lights[i].light, &desc);
+        if (es_world_get_light(p->session.world, p->nodes.lights[i].light, &desc) != ES_OK || desc.node.id != p->nodes.lights[i].own.id) continue;
+        desc.node = p->nodes.lights[i].scenes;
+        es_world_set_light(p->session.world, p->nodes.lights[i].light, &desc);
     }
 }
 
-void player_release(player* p) { p->hand.what = HELD_NOTHING; }
+/* ---- bodies and cloth ---------------------------------------------------------------------------------------------------------------------- */
+
+enum { HAND = 0 };
+static const float reach = 1e6f; /* metres that a hand can look */
+
+static es_vec3 rotate(es_quat q, es_vec3 v)
+{
+    es_vec3 t = {2 * (q.y * v.z - q.z * v.y), 2 * (q.z * v.x - q.x * v.z), 2 * (q.x * v.y - q.y * v.x)};
+    return (es_vec3){v.x + q.w * t.x + q.y * t.z - q.z * t.y, v.y + q.w * t.y + q.z * t.x - q.x * t.z, v.z + q.w * t.z + q.x * t.y - q.y * t.x};
+}
+
+/* Where the held thing is held; false when it is not held any more. */
+static bool held_point(const player* p, double point[3])
+{
+    es_hand_state state;
+    es_body_state body;
+    if (es_world_get_hand(p->session.world, HAND, &state) != ES_OK) return false;
+    if (state.soft) return es_world_get_soft_vertex(p->session.world, (es_soft){state.soft}, state.vertex, point, NULL) == ES_OK;
+    if (!state.body.id || es_world_get_body(p->session.world, state.body, &body) != ES_OK) return false;
+    es_vec3 arm = rotate(body.rotation, state.local_point);
+    point[0] = body.position[0] + (double)arm.x;
+    point[1] = body.position[1] + (double)arm.y;
+    point[2] = body.position[2] + (double)arm.z;
+    return true;
+}
+
+static void hold(player* p, player_held what, const eye* e, const double point[3], bool by_keyboard)
+{
+    player_hand* h = &p->hand;
+    h->what = what;
+    h->by_keyboard = by_keyboard;
+    memcpy(h->target, point, sizeof h->target);
+    h->distance = -to_eye(e, point).z;
+}
+
+/* How far ahead of the eye what the pixel shows is; 0: nothing is there. */
+static float seen_at(player* p, float x, float y)
+{
+    es_image depth = {0};
+    float seen = 0;
+    if (es_renderer_image(p->session.renderer, "depth", &depth) != ES_OK) return 0;
+    uint32_t px = (uint32_t)(fmaxf(x, 0) * (float)depth.width / (float)p->canvas.width), py = (uint32_t)(fmaxf(y, 0) * (float)depth.height / (float)p->canvas.height);
+    if (px < depth.width && py < depth.height) seen = depth.pixels[((size_t)py * depth.width + px) * depth.channels];
+    es_image_destroy(p->session.context, &depth);
+    return seen > 0 && isfinite(seen) ? seen : 0;
+}
+
+/* A body that can be moved at a point that is seen. Shapes and what shows them differ, so its surroundings count, the nearest first; and
+ * bodies that nothing shows (walls that keep things in) are no obstacle, as they would be to a ray. */
+static bool movable_at(player* p, const double point[3], float radius, es_body* found, es_body_state* state)
+{
+    for (int attempt = 0; attempt < 3; attempt++, radius *= 3) {
+        es_shape_desc sphere = {.type = ES_SHAPE_SPHERE, .radius = radius};
+        es_body bodies[64];
+        size_t count = sizeof bodies / sizeof bodies[0];
+        if (es_world_overlap(p->session.world, &sphere, point, (es_quat){0, 0, 0, 1}, 0, bodies, &count) != ES_OK) return false;
+        for (size_t i = 0; i < count && i < sizeof bodies / sizeof bodies[0]; i++)
+            if (es_world_get_body(p->session.world, bodies[i], state) == ES_OK && state->type == ES_BODY_DYNAMIC) {
+                *found = bodies[i];
+                return true;
+            }
+    }
+    return false;
+}
+
+/* What the pixel shows, when it is cloth or a body that can be moved. */
+static bool grab_at(player* p, float x, float y, bool by_keyboard)
+{
+    es_world* world = p->session.world;
+    eye e;
+    double origin[3], point[3];
+    es_vec3 direction;
+    es_soft_contact soft = {0};
+    es_body body;
+    es_body_state state;
+    float seen = seen_at(p, x, y);
+    if (!(seen > 0) || !look(p, &e)) return false;
+    pixel_ray(&e, x, y, origin, &direction);
+    if (es_world_soft_pick(world, origin, direction, reach, &soft) == ES_OK && soft.soft.id && -to_eye(&e, soft.point).z <= seen * 1.02f + 0.02f) {
+        if (es_world_grab_soft(world, HAND, soft.soft, soft.vertex, soft.point) != ES_OK) return false;
+        hold(p, HELD_SOFT, &e, soft.point, by_keyboard);
+        return true;
+    }
+    to_world(&e, from_pixel(&e, x, y, seen), point);
+    if (!movable_at(p, point, 0.004f * seen, &body, &state)) return false;
+    es_vec3 arm = {(float)(point[0] - state.position[0]), (float)(point[1] - state.position[1]), (float)(point[2] - state.position[2])};
+    es_quat back = {-state.rotation.x, -state.rotation.y, -state.rotation.z, state.rotation.w};
+    if (es_world_grab_body(world, HAND, body, rotate(back, arm), point, 0) != ES_OK) return false;
+    hold(p, HELD_BODY, &e, point, by_keyboard);
+    return true;
+}
+
+void player_release(player* p)
+{
+    if (p->hand.what == HELD_BODY || p->hand.what == HELD_SOFT) es_world_release(p->session.world, HAND);
+    p->hand.what = HELD_NOTHING;
+}
+
+void player_grab(player* p)
+{
+    if (p->hand.what) player_release(p);
+    else if (grab_at(p, (float)p->canvas.width / 2, (float)p->canvas.height / 2, true)) player_notice(p, "held: arrow keys, Page Up and Down; Enter throws, F lets go");
+    else player_notice(p, "nothing to hold in the middle of the picture");
+    p->hand.cross_until = demo_seconds() + 4;
+}
+
+/* Away from the eye, at a speed that crosses the scene in a second. */
+void player_throw(player* p)
+{
+    eye e;
+    double origin[3];
+    es_vec3 direction;
+    es_hand_state hand;
+    if (p->hand.what != HELD_BODY || !look(p, &e) || es_world_get_hand(p->session.world, HAND, &hand) != ES_OK) return;
+    player_release(p);
+    pixel_ray(&e, e.width / 2, e.height / 2, origin, &direction);
+    float speed = 6 * p->nodes.fly.speed;
+    es_world_set_body_velocity(p->session.world, hand.body, (es_vec3){direction.x * speed, direction.y * speed, direction.z * speed}, (es_vec3){0, 0, 0});
+}
+
+static bool pick_soft(player* p, float x, float y, es_soft_contact* contact)
+{
+    eye e;
+    double origin[3];
+    es_vec3 direction;
+    if (!look(p, &e)) return false;
+    pixel_ray(&e, x, y, origin, &direction);
+    return es_world_soft_pick(p->session.world, origin, direction, reach, contact) == ES_OK && contact->soft.id;
+}
+
+/* A hole as wide as a twentieth of the way to it; cloth that does not tear comes off its hooks. */
+static void tear_at(player* p, float x, float y)
+{
+    es_soft_contact contact = {0};
+    if (!pick_soft(p, x, y, &contact)) {
+        player_notice(p, "no cloth there");
+        return;
+    }
+    if (es_world_soft_tear(p->session.world, contact.soft, contact.point, contact.distance / 20) == ES_OK) player_notice(p, "torn");
+    else if (es_world_soft_detach(p->session.world, contact.soft, ES_SOFT_ALL) == ES_OK) player_notice(p, "off its hooks");
+}
+
+void player_tear(player* p)
+{
+    tear_at(p, (float)p->canvas.width / 2, (float)p->canvas.height / 2);
+    p->hand.cross_until = demo_seconds() + 4;
+}
+
+/* What is held, else what is in the middle of the picture. */
+void player_unhook(player* p)
+{
+    es_hand_state hand;
+    es_soft_contact contact = {0};
+    bool held = p->hand.what == HELD_SOFT && es_world_get_hand(p->session.world, HAND, &hand) == ES_OK && hand.soft;
+    if (!held && !pick_soft(p, (float)p->canvas.width / 2, (float)p->canvas.height / 2, &contact)) player_notice(p, "no cloth there");
+    else if (es_world_soft_detach(p->session.world, held ? (es_soft){hand.soft} : contact.soft, ES_SOFT_ALL) == ES_OK) player_notice(p, "off its hooks");
+    else player_notice(p, "%s", es_context_message(p->session.context));
+}
 
 /* ---- mouse and keys -------------------------------------------------------------------------------------------------------------------------- */
 
@@ -194,14 +345,14 @@ static bool take_light_at(player* p, float x, float y)
     if (!h->show_lights || !look(p, &e)) return false;
     int nearest = -1;
     float best = (float)(GRASP * p->ui.scale);
-    for (size_t i = 0; i < h->light_count; i++) {
+    for (size_t i = 0; i < p->nodes.light_count; i++) {
         double position[3];
         float px, py;
-        if (!light_position(p, h->lights[i].light, position) || !to_pixel(&e, to_eye(&e, position), &px, &py)) continue;
+        if (!light_position(p, p->nodes.lights[i].light, position) || !to_pixel(&e, to_eye(&e, position), &px, &py)) continue;
         float away = hypotf(px - x, py - y);
         if (away < best) best = away, nearest = (int)i;
     }
-    if (nearest >= 0) hold_light(p, h->lights[nearest].light, false);
+    if (nearest >= 0) hold_light(p, p->nodes.lights[nearest].light, false);
     return nearest >= 0;
 }
 
@@ -211,10 +362,23 @@ static void move_by_keys(player* p, const eye* e, const es_window_input* input)
     float right = (float)input->down[ES_KEY_RIGHT] - (float)input->down[ES_KEY_LEFT], up = (float)input->down[ES_KEY_UP] - (float)input->down[ES_KEY_DOWN];
     float away = (float)input->down[ES_KEY_PAGE_UP] - (float)input->down[ES_KEY_PAGE_DOWN];
     if (right == 0 && up == 0 && away == 0) return;
-    float step = p->fly.speed * p->seconds * (input->down[ES_KEY_SHIFT] ? 4.0f : 1.0f);
+    float step = p->nodes.fly.speed * p->seconds * (input->down[ES_KEY_SHIFT] ? 4.0f : 1.0f);
     es_vec3 place = to_eye(e, h->target);
     place = (es_vec3){place.x + right * step, place.y + up * step, place.z - away * step};
     to_world(e, place, h->target);
+}
+
+/* What is held may be gone: torn, or the scene rewound. */
+static void move_hand(player* p)
+{
+    player_hand* h = &p->hand;
+    es_hand_state state;
+    if (h->what != HELD_BODY && h->what != HELD_SOFT) return;
+    if (es_world_get_hand(p->session.world, HAND, &state) != ES_OK || (!state.body.id && !state.soft)) {
+        h->what = HELD_NOTHING;
+        return;
+    }
+    if (memcmp(state.target, h->target, sizeof state.target) != 0) es_world_move_hand(p->session.world, HAND, h->target);
 }
 
 bool player_hand_update(player* p, const es_window_input* input)
@@ -223,7 +387,8 @@ bool player_hand_update(player* p, const es_window_input* input)
     eye e;
     bool had = h->what != HELD_NOTHING && !h->by_keyboard;
     if (h->what == HELD_NOTHING || h->by_keyboard)
-        if (input->mouse_pressed[0] && take_light_at(p, input->press_x[0], input->press_y[0])) had = true;
+        if (input->mouse_pressed[0] && (take_light_at(p, input->press_x[0], input->press_y[0]) || grab_at(p, input->press_x[0], input->press_y[0], false))) had = true;
+    if (input->mouse_pressed[2]) tear_at(p, input->press_x[2], input->press_y[2]);
     if (h->what == HELD_NOTHING || !look(p, &e)) return false;
     if (input->scroll != 0) {
         es_vec3 place = to_eye(&e, h->target);
@@ -236,34 +401,61 @@ bool player_hand_update(player* p, const es_window_input* input)
         return false;
     }
     if (had && (input->mouse_dx != 0 || input->mouse_dy != 0 || input->scroll != 0)) to_world(&e, from_pixel(&e, input->mouse_x, input->mouse_y, h->distance), h->target);
-    if (!input->mouse_down[0]) player_release(p);
+    if (!input->mouse_down[0]) {
+        move_hand(p); /* the last of the way before it lets go */
+        player_release(p);
+    }
     return true;
+}
+
+int player_hand_pull(player* p)
+{
+    if (p->hand.what == HELD_BODY || p->hand.what == HELD_SOFT) move_hand(p);
+    return DEMO_OK;
 }
 
 int player_hand_apply(player* p)
 {
     player_hand* h = &p->hand;
-    int index = h->what == HELD_LIGHT ? index_of(h, h->light) : -1;
+    int index = h->what == HELD_LIGHT ? index_of(p, h->light) : -1;
     if (index < 0) return DEMO_OK;
     es_transform transform;
-    if (es_world_get_node_transform(p->session.world, h->lights[index].own, &transform) != ES_OK) return DEMO_BAD_INPUT;
+    if (es_world_get_node_transform(p->session.world, p->nodes.lights[index].own, &transform) != ES_OK) return DEMO_BAD_INPUT;
     es_vec3 to = {(float)h->target[0], (float)h->target[1], (float)h->target[2]};
     if (transform.translation.x == to.x && transform.translation.y == to.y && transform.translation.z == to.z) return DEMO_OK;
     transform.translation = to;
-    return es_world_set_node_transform(p->session.world, h->lights[index].own, &transform) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
+    return es_world_set_node_transform(p->session.world, p->nodes.lights[index].own, &transform) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
+}
+
+/* A line from where it is held to where the hand is. */
+static void draw_pull(player* p, const eye* e)
+{
+    double point[3];
+    float x0, y0, x1, y1;
+    int s = p->ui.scale;
+    if (!held_point(p, point) || !to_pixel(e, to_eye(e, point), &x0, &y0) || !to_pixel(e, to_eye(e, p->hand.target), &x1, &y1)) return;
+    if (fabsf(x0) + fabsf(y0) + fabsf(x1) + fabsf(y1) > 1e5f) return;
+    canvas_line(&p->canvas, (int)x0, (int)y0, (int)x1, (int)y1, s, UI_FOCUS);
+    canvas_dot(&p->canvas, (int)x0 - 2 * s, (int)y0 - 2 * s, 5 * s, UI_FOCUS);
 }
 
 void player_hand_draw(player* p)
 {
     player_hand* h = &p->hand;
     eye e;
-    if (p->hide_all || !h->show_lights || !look(p, &e)) return;
-    int s = p->ui.scale;
-    for (size_t i = 0; i < h->light_count; i++) {
+    if (p->hide_all || !look(p, &e)) return;
+    int s = p->ui.scale, cx = (int)p->canvas.width / 2, cy = (int)p->canvas.height / 2;
+    if (h->what == HELD_BODY || h->what == HELD_SOFT) draw_pull(p, &e);
+    if (demo_seconds() < h->cross_until) {
+        canvas_line(&p->canvas, cx - 8 * s, cy, cx + 8 * s, cy, s, UI_TEXT);
+        canvas_line(&p->canvas, cx, cy - 8 * s, cx, cy + 8 * s, s, UI_TEXT);
+    }
+    if (!h->show_lights) return;
+    for (size_t i = 0; i < p->nodes.light_count; i++) {
         double position[3];
         float x, y;
-        if (!light_position(p, h->lights[i].light, position) || !to_pixel(&e, to_eye(&e, position), &x, &y)) continue;
-        bool held = h->what == HELD_LIGHT && h->light.id == h->lights[i].light.id;
+        if (!light_position(p, p->nodes.lights[i].light, position) || !to_pixel(&e, to_eye(&e, position), &x, &y)) continue;
+        bool held = h->what == HELD_LIGHT && h->light.id == p->nodes.lights[i].light.id;
         canvas_rect mark = {(int)x - 5 * s, (int)y - 5 * s, 11 * s, 11 * s};
         canvas_blend(&p->canvas, mark, 0, 128);
         canvas_frame(&p->canvas, mark, s, held ? UI_FOCUS : UI_TEXT);

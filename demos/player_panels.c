@@ -153,7 +153,7 @@ static void timeline_panel(player* p, int top)
     if (ui_button(u, "slower", 3, "-")) speed = speed > 0 ? speed / 2 : 1;
     ui_label(u, 7, UI_TEXT, text);
     if (ui_button(u, "faster", 3, "+")) speed = speed > 0 ? speed * 2 : 1;
-    if (speed != p->world.speed && speed >= 1.0f / 64 && speed <= 100) {
+    if (!p->replaying && speed != p->world.speed && speed >= 1.0f / 64 && speed <= 100) {
         p->world.speed = speed;
         es_world_configure(p->session.world, &p->world);
     }
@@ -182,6 +182,8 @@ static void notice(player* p, int bottom)
     ui* u = &p->ui;
     char line[300] = "";
     if (demo_seconds() < p->notice_until) snprintf(line, sizeof line, "%s", p->notice);
+    else if (p->replaying) snprintf(line, sizeof line, "replay, step %u of %u", p->replayed, es_recording_steps(p->session.replay));
+    else if (p->session.recording && !p->capture.recording) snprintf(line, sizeof line, "recording: %s", p->options.record);
     else if (p->capture.recording) snprintf(line, sizeof line, "recording, %u frames; F12 ends", p->capture.frame);
     if (!line[0]) return;
     int width = columns(p, font_columns(line)), x = ((int)p->canvas.width - width) / 2;

@@ -43,7 +43,12 @@ int player_open_scene(player* p, const char* scene, bool keep)
     p->world = p->opened = world;
     p->split.former = renderer;
     if (p->scene != scene) snprintf(p->scene, sizeof p->scene, "%s", scene);
-    if (fly_camera_init(&p->fly, p->session.world) != DEMO_OK || player_hand_open(p) != DEMO_OK) return demo_refuse_context(p->session.context);
+    if (player_nodes_add(p->session.world, &p->nodes) != DEMO_OK) return demo_refuse_context(p->session.context);
+    if (first && p->options.record && demo_record_begin(&p->session, p->scene, true) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (first && p->session.replay) {
+        if (es_recording_rewind(p->session.replay, p->session.world) != ES_OK) return demo_refuse_context(p->session.context);
+        p->replaying = true;
+    }
     history_add(&p->history, p->session.world);
     if (p->window) player_open_title(p);
     return DEMO_OK;
@@ -56,8 +61,19 @@ void player_open_title(player* p)
     es_window_set_title(p->window, title);
 }
 
+void player_end_replay(player* p, const char* why)
+{
+    if (!p->replaying) return;
+    p->replaying = false;
+    fly_camera_adopt(&p->nodes.fly, p->session.world);
+    p->world = es_world_get_settings(p->session.world);
+    player_notice(p, "the replay %s after %u steps; from here on it is yours", why, p->replayed);
+}
+
 void player_close_scene(player* p)
 {
+    player_end_replay(p, "ends");
+    if (p->session.recording && demo_record_end(&p->session, p->options.record) != DEMO_OK) p->failed = true;
     player_split_close(p);
     history_clear(&p->history);
     memset(&p->hand, 0, sizeof p->hand);

@@ -37,6 +37,7 @@ typedef struct trial {
 static bool accepts(void* user, double value)
 {
     trial* t = user;
+    if (t->world && t->p->replaying) return false;
     if (t->world) {
         es_world_settings settings = t->p->world;
         setting_store(t->setting, &settings, value);
@@ -52,7 +53,7 @@ static void change(player* p, const es_setting* setting, bool world, double want
     trial t = {p, setting, world};
     double now = setting_value(setting, world ? (const void*)&p->world : &p->session.settings);
     double value = setting_accepted(setting, now, wanted, accepts, &t);
-    if (value == now) return;
+    if (value == now || (world && p->replaying)) return;
     if (!world) {
         es_renderer_settings settings = p->session.settings;
         setting_store(setting, &settings, value);

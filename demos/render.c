@@ -52,6 +52,14 @@ static int write_frame(const demo_options* options, demo_session* session, uint3
     return DEMO_OK;
 }
 
+/* A recording has as many frames as steps: all of them, or those that were asked for. */
+static int fit_replay(demo_options* options, uint32_t steps)
+{
+    if (!options->frames_given) options->end = steps;
+    if (options->end > steps) return demo_refuse("--replay %s: there are %u frames, --frames asks for %u", options->replay, steps, options->end);
+    return options->out ? demo_check_pattern("--out", options->out, options->end - options->first) : DEMO_OK;
+}
+
 int demo_render_frames(const demo_options* given, bool show_progress)
 {
     demo_options options = *given;
@@ -65,10 +73,16 @@ int demo_render_frames(const demo_options* given, bool show_progress)
         if (demo_check_writable(path) != DEMO_OK) return DEMO_BAD_INPUT;
     }
     if (options.stats && demo_check_writable(options.stats) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (options.record && demo_check_writable(options.record) != DEMO_OK) return DEMO_BAD_INPUT;
 
     demo_session session;
     int code = demo_session_open(&options, &session);
     if (code != DEMO_OK) return code;
+    if (session.replay && fit_replay(&options, es_recording_steps(session.replay)) != DEMO_OK) {
+        demo_session_close(&session);
+        return DEMO_BAD_INPUT;
+    }
+    const bool shows = options.out || options.hash || options.stats;
     demo_text stats = {0};
     demo_text_add(&stats, "{\"machine\":");
     demo_text_add_machine(&stats, session.context);
@@ -76,7 +90,7 @@ int demo_render_frames(const demo_options* given, bool show_progress)
     bool terminal = show_progress && isatty(STDERR_FILENO);
     for (uint32_t frame = 0; frame < options.end && code == DEMO_OK; frame++) {
         code = demo_session_step(&session, frame, options.fps);
-        if (code != DEMO_OK || frame < options.first) continue;
+        if (code != DEMO_OK || frame < options.first || !shows) continue;
         if (es_renderer_render(session.renderer, session.world) != ES_OK) {
             code = demo_refuse_context(session.context);
             break;
@@ -95,6 +109,8 @@ int demo_render_frames(const demo_options* given, bool show_progress)
                             : demo_write_text(options.stats, stats.bytes, stats.size);
     }
     demo_text_free(&stats);
+    if (code == DEMO_OK && options.record) code = demo_record_end(&session, options.record);
+    if (code == DEMO_OK && session.replay) fprintf(stderr, "earthshine: %u steps replayed as they were recorded\n", options.end);
     demo_session_close(&session);
     if (code == DEMO_OK && fflush(stdout) != 0) code = demo_refuse("standard output cannot be written");
     return code;
@@ -104,8 +120,8 @@ int demo_render(int count, char** arguments)
 {
     demo_options options;
     if (demo_parse_options("render", count, arguments, &options) != DEMO_OK) return DEMO_BAD_INPUT;
-    if (!options.scene) return demo_refuse("render: a scene or a glTF file is expected; `earthshine scenes` lists the scenes");
-    if (!options.out && !options.hash && !options.stats)
-        return demo_refuse("render: nothing would come of it; give --out FILE, --hash or --stats FILE");
+    if (!options.scene && !options.replay) return demo_refuse("render: a scene or a glTF file is expected; `earthshine scenes` lists the scenes");
+    if (!options.out && !options.hash && !options.stats && !options.record && !options.replay)
+        return demo_refuse("render: nothing would come of it; give --out FILE, --hash, --stats FILE, --record FILE or --replay FILE");
     return demo_render_frames(&options, options.end - options.first > 1);
 }

@@ -14,22 +14,28 @@ int demo_session_open_context(const demo_options* options, demo_session* session
     return result == ES_OK ? DEMO_OK : demo_refuse("%s", es_result_text(result));
 }
 
-int demo_session_open(const demo_options* options, demo_session* session)
+int demo_session_open(const demo_options* given, demo_session* session)
 {
+    demo_options options_in_use = *given, *options = &options_in_use;
     int code = demo_session_open_context(options, session);
     if (code != DEMO_OK) return code;
     es_world_settings world_settings;
-    code = demo_apply_settings(session->context, options, &world_settings, &session->settings, NULL);
+    if (options->replay) code = demo_replay_load(session, options);
+    if (code == DEMO_OK) code = demo_apply_settings(session->context, options, &world_settings, &session->settings, NULL);
     if (code == DEMO_OK && es_world_open(session->context, options->scene, &world_settings, &session->world) != ES_OK)
         code = demo_refuse_context(session->context);
     if (code == DEMO_OK && es_renderer_create(session->context, &session->settings, &session->renderer) != ES_OK)
         code = demo_refuse_context(session->context);
+    if (code == DEMO_OK && options->replay) code = demo_replay_begin(session);
+    if (code == DEMO_OK && options->record) code = demo_record_begin(session, options->scene, false);
     if (code != DEMO_OK) demo_session_close(session);
     return code;
 }
 
 void demo_session_close(demo_session* session)
 {
+    es_recording_destroy(session->recording);
+    es_recording_destroy(session->replay);
     if (session->renderer) es_renderer_destroy(session->renderer);
     if (session->world) es_world_destroy(session->world);
     if (session->context) es_context_destroy(session->context);
@@ -38,6 +44,7 @@ void demo_session_close(demo_session* session)
 
 int demo_session_step(demo_session* session, uint32_t frame, double fps)
 {
+    if (session->replay) return demo_replay_step(session, frame);
     float dt = frame ? (float)(1.0 / fps) : 0.0f; /* frame 0 is the world as it was made */
     return es_world_step(session->world, dt) == ES_OK ? DEMO_OK : demo_refuse_context(session->context);
 }

@@ -1,5 +1,6 @@
 /* What can be named on the command line, listed: settings of world, renderer and reference, scenes, images; and settings applied. */
 #include "demo.h"
+#include "setting_slider.h"
 
 #include <string.h>
 
@@ -102,13 +103,44 @@ static int apply_reference_options(es_context* context, const demo_options* opti
     return DEMO_OK;
 }
 
+/* key=value between blanks. */
+static int apply_words(const setting_targets* to, const char* origin, const char* words)
+{
+    char word[256];
+    while (*(words += strspn(words, " "))) {
+        size_t length = strcspn(words, " ");
+        if (length >= sizeof word || !memchr(words, '=', length)) return demo_refuse("%s: its settings are damaged", origin);
+        snprintf(word, sizeof word, "%.*s", (int)length, words);
+        if (apply_set(to, origin, word) != DEMO_OK) return DEMO_BAD_INPUT;
+        words += length;
+    }
+    return DEMO_OK;
+}
+
+static void add_settings(demo_text* text, const es_setting* setting, const void* settings)
+{
+    char now[SETTING_TEXT_SIZE];
+    double value = setting_value(setting, settings);
+    if (value == setting_default(setting) || !strcmp(setting->name, "width") || !strcmp(setting->name, "height")) return;
+    setting_text(setting, value, now);
+    demo_text_add(text, " %s=%s", setting->name, now);
+}
+
+void demo_text_add_settings(demo_text* text, const es_world_settings* world, const es_renderer_settings* renderer)
+{
+    for (size_t i = 0; i < es_world_setting_count(); i++) add_settings(text, es_world_setting(i), world);
+    for (size_t i = 0; i < es_renderer_setting_count(); i++) add_settings(text, es_renderer_setting(i), renderer);
+}
+
 int demo_apply_settings(es_context* context, const demo_options* options, es_world_settings* world, es_renderer_settings* renderer,
     es_reference_settings* reference)
 {
     *world = es_default_world_settings();
     if (renderer) *renderer = es_default_renderer_settings();
     if (reference) *reference = es_default_reference_settings();
-    if (options->scene && demo_apply_scene_settings(context, options->scene, world, renderer, reference) != DEMO_OK) return DEMO_BAD_INPUT;
+    const setting_targets to = {context, world, renderer, reference};
+    if (options->recorded_settings && apply_words(&to, options->replay, options->recorded_settings) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (options->scene && !options->recorded_settings && demo_apply_scene_settings(context, options->scene, world, renderer, reference) != DEMO_OK) return DEMO_BAD_INPUT;
     if (renderer) {
         if (options->method >= 0) renderer->method = (uint32_t)options->method;
         if (options->no_skip) renderer->skip = false;

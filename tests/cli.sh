@@ -110,6 +110,24 @@ assert any(p['skipped'] is None for p in frame['passes'])
 PYTHON
 fi
 
+# ---- recordings --------------------------------------------------------------------------------------------------------
+expect 0 render cornell-stack "${small[@]}" --set exposure=1 --frames 0:6 --hash --record stack.rec
+cp out recorded
+expect 0 render --replay stack.rec --size 64x48 --hash --threads 1 --isa scalar
+cmp -s out recorded || fail 'a replay shows something else than was recorded'
+expect 0 render --replay stack.rec
+says '6 steps' err
+expect 0 render --replay stack.rec --size 64x48 --frames 4:5 --hash
+says '^frame 4 display '
+refused '6 frames' render --replay stack.rec --frames 0:7 --hash
+refused 'is a recording of cornell-stack' render cornell --replay stack.rec
+refused 'exclude each other' render --replay stack.rec --record other.rec
+refused 'nowhere' render cornell --record nowhere/at.rec
+refused 'missing.rec' render --replay missing.rec
+head -c 2000 stack.rec >damaged.rec
+refused 'damaged' render --replay damaged.rec
+refused 'option of render and play' reference cornell --out truth.exr --record other.rec
+
 refused 'scene' render
 refused 'nothing would come of it' render cornell
 refused "nearest is 'cornell'" render cornel --hash

@@ -276,6 +276,40 @@ if play cornell --size 640x480 "${small[@]}"; then
     quit
 fi
 
+# ---- bodies: one is taken from the stack; wound back and left alone it stays; all of it is recorded and replayed ---------
+if play cornell-stack --size 640x480 "${small[@]}" --image instance --record stack.rec; then
+    key space
+    shot
+    first=$picture
+    xdotool mousemove 285 266 mousedown 1
+    sleep 0.3
+    xdotool mousemove 360 180
+    sleep 0.3
+    key n n n n n n n n n n n n
+    shot
+    held=$picture
+    xdotool mouseup 1
+    key bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft bracketleft
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'winding back does not undo what the hand did'
+    key n n n n n n n n n n n n
+    shot
+    checks=$((checks + 1))
+    different "$held" "$picture" || fail 'the hand moves no body'
+    key f # whatever is in the middle, or nothing
+    quit
+    for arguments in '' '--threads 1 --isa scalar'; do
+        checks=$((checks + 1))
+        # shellcheck disable=SC2086
+        "$program" render --replay stack.rec $arguments >out 2>err || fail "the replay is another: $arguments"
+    done
+fi
+if play --replay stack.rec --size 320x240; then
+    check 'the replay does not end' eval '! kill -0 $player || { xdotool key --window $window ctrl+s; grep -q cornell-stack out; }'
+    quit
+fi
+
 # ---- Wayland: a compositor in a window of the same screen, which gives the player all of it ------------------------------
 wayland()
 {
