@@ -236,6 +236,7 @@ int demo_play(int count, char** arguments)
     if (code == DEMO_OK && p->failed) code = DEMO_BAD_INPUT;
     if (code == DEMO_OK && p->differed) code = DEMO_EXCEEDED;
     if (p->session.context) es_context_destroy(p->session.context);
+    free(p->graphs.luminance);
     free(p->canvas.pixels);
     free(p);
     if (opened == ES_NO_DISPLAY || opened == ES_NOT_BUILT) {

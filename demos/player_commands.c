@@ -82,6 +82,7 @@ static void wind(player* p, int states)
     p->steps = 0;
     player_release(p);
     if (history_go(h, p->session.world, at < 0 ? 0 : (uint32_t)at) != ES_OK) player_notice(p, "%s", es_context_message(p->session.context));
+    player_release(p);
     fly_camera_place(&p->nodes.fly, p->session.world);
     p->world = es_world_get_settings(p->session.world);
 }

@@ -179,7 +179,9 @@ void player_graphs_panel(player* p, canvas_rect rect)
     const int curves = isfinite(ui_series_at(&g->energy, 0)) ? 4 : 3;
     int text = curves * (u->row + 2 * u->scale) + 8 * FONT_HEIGHT * u->scale, left = rect.y + rect.height - u->y - text - 6 * u->scale;
     int height = left / (curves + 2) > 12 * u->scale ? left / (curves + 2) : 12 * u->scale;
-    plot(p, height, "frame", "%.2f ms", &g->frame, UI_TEXT);
+    char title[64];
+    snprintf(title, sizeof title, "interface %.2f ms, frame", p->interface_milliseconds);
+    plot(p, height, title, "%.2f ms", &g->frame, UI_TEXT);
     plot(p, height, "flicker", "%.4f", &g->flicker, colours[3]);
     plot(p, height, "brightness", "%.3f", &g->brightness, colours[1]);
     if (isfinite(ui_series_at(&g->energy, 0))) plot(p, height, "energy", "%.4g J", &g->energy, colours[2]);

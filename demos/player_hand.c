@@ -267,9 +267,11 @@ static bool grab_at(player* p, float x, float y, bool by_keyboard)
     return true;
 }
 
+/* Also what a state that was gone back to holds. */
 void player_release(player* p)
 {
-    if (p->hand.what == HELD_BODY || p->hand.what == HELD_SOFT) es_world_release(p->session.world, HAND);
+    es_hand_state state;
+    if (es_world_get_hand(p->session.world, HAND, &state) == ES_OK && (state.body.id || state.soft)) es_world_release(p->session.world, HAND);
     p->hand.what = HELD_NOTHING;
 }
 

@@ -65,6 +65,7 @@ void player_end_replay(player* p, const char* why)
 {
     if (!p->replaying) return;
     p->replaying = false;
+    player_release(p);
     fly_camera_adopt(&p->nodes.fly, p->session.world);
     p->world = es_world_get_settings(p->session.world);
     player_notice(p, "the replay %s after %u steps; from here on it is yours", why, p->replayed);

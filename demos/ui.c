@@ -47,7 +47,7 @@ void ui_draw_on(ui* u, demo_canvas* canvas)
 static void navigate(ui* u)
 {
     const bool* pressed = u->input->repeated;
-    bool shift = u->input->down[ES_KEY_SHIFT];
+    bool shift = u->input->down[ES_KEY_SHIFT] || u->input->pressed[ES_KEY_SHIFT];
     if (pressed[ES_KEY_TAB]) {
         u->editing = 0;
         u->focus = ui_focus_move(u->items, u->item_count, u->focus, shift ? UI_MOVE_PREVIOUS_PANEL : UI_MOVE_NEXT_PANEL);

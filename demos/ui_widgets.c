@@ -132,7 +132,7 @@ static float fraction_at(canvas_rect rect, float x)
 static ui_slider_act slider_keys(ui* u, ui_id id, float* fraction, int* steps)
 {
     const es_window_input* in = u->input;
-    int reach = in->down[ES_KEY_SHIFT] ? 10 : 1;
+    int reach = in->down[ES_KEY_SHIFT] || in->pressed[ES_KEY_SHIFT] ? 10 : 1;
     if (in->pressed[ES_KEY_ENTER]) {
         u->editing = id;
         u->edit[0] = 0;

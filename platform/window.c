@@ -103,6 +103,9 @@ static void on_key(GLFWwindow* glfw, int key, int scan_code, int action, int mod
     es_window* window = glfwGetWindowUserPointer(glfw);
     int index = key_of(key);
     if (index < 0) return;
+    /* a poll may come after the modifier was let go again: what a key was pressed with counts as pressed with it */
+    if (action == GLFW_PRESS && (modifiers & GLFW_MOD_CONTROL)) window->input.pressed[ES_KEY_CONTROL] = true;
+    if (action == GLFW_PRESS && (modifiers & GLFW_MOD_SHIFT)) window->input.pressed[ES_KEY_SHIFT] = true;
     if (action != GLFW_RELEASE) window->input.repeated[index] = true;
     if (action == GLFW_REPEAT) return;
     window->input.down[index] = action == GLFW_PRESS;
