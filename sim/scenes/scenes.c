@@ -8,15 +8,20 @@
 /* Settings a scene is shown best with stand behind its builder: SETTINGS("temporal=true", "bounces=3"). */
 #define SETTINGS(...) ((const char* const[]){__VA_ARGS__, NULL})
 
+/* Nothing flickers: history, lights that stay on their surfaces, smooth edges. */
+#define STEADY "temporal=true", "vpl.stable=true", "antialias=temporal"
+
 static const es_scene scenes[] = {
     {"cornell", "a Cornell box with four moving objects under a moving spot light (3,372 triangles)", es_scene_cornell},
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
     {"hall", "a colonnade lit from its side aisle, for the most part by what the walls give back (108,516 triangles)", es_scene_hall},
-    {"cornell-stack", "a stack of cubes in a Cornell box, a ball that brings it down, a lamp that sways (3,372 triangles)", es_scene_cornell_stack},
-    {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature},
-    {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk},
-    {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things},
-    {"stress", "everything fast: bodies that bounce without loss, a light that sweeps and flickers", es_scene_stress},
+    {"cornell-stack", "a stack of cubes in a Cornell box, a ball that brings it down, a lamp that sways (3,372 triangles)", es_scene_cornell_stack, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
+    {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "shadow.size=512")},
+    {"curtain", "a curtain in a doorway opens and closes the light of a room", es_scene_curtain, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "exposure=0.7")},
+    {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096")},
+    {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096")},
+    {"ring", "silk falls into a polished ring, whose inside throws a curve of light", es_scene_ring, SETTINGS(STEADY, "vpl.count=2048", "ism.size=64", "ism.points=2048")},
+    {"stress", "everything fast: bodies that bounce without loss, a light that sweeps and flickers", es_scene_stress, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
 };
 
 size_t es_scene_count(void) { return sizeof scenes / sizeof scenes[0]; }

@@ -18,6 +18,8 @@ es_result es_scene_hall(es_world* world, uint32_t triangles);
 es_result es_scene_cornell_stack(es_world* world, uint32_t triangles);
 es_result es_scene_rain_of_things(es_world* world, uint32_t triangles);
 es_result es_scene_stress(es_world* world, uint32_t triangles);
+es_result es_scene_ring(es_world* world, uint32_t triangles);
+es_result es_scene_curtain(es_world* world, uint32_t triangles);
 es_result es_scene_creature(es_world* world, uint32_t triangles);
 es_result es_scene_lantern_walk(es_world* world, uint32_t triangles);
 

@@ -1,0 +1,83 @@
+/* Cloth falls into a glossy ring: after Ritschel's thesis, figure 5.13, whose ring has a Phong lobe of exponent 50. The light that the
+ * inside of the ring throws draws the curve of a coffee cup's on floor and cloth. */
+#include "sim/scenes/cloth_tools.h"
+
+#include "platform/maths.h"
+
+static const float radius = 0.62f, thickness = 0.035f, height = 0.42f;
+
+/* The ring stops cloth and bodies by 24 boxes in a circle. */
+static void add_ring_body(es_scene_builder* builder, es_node node)
+{
+    enum { BOXES = 24 };
+    es_shape_desc boxes[BOXES];
+    for (int i = 0; i < BOXES; i++) {
+        float angle = 6.2831853f * ((float)i + 0.5f) / BOXES;
+        boxes[i] = es_box_shape(es_v3(0.5f * thickness, 0.5f * height, (radius + thickness) * 3.1415927f / BOXES));
+        boxes[i].position = es_v3((radius + 0.5f * thickness) * es_cos(angle), 0.5f * height, -(radius + 0.5f * thickness) * es_sin(angle));
+        boxes[i].rotation = es_quat_from_axis_angle(es_v3(0, 1, 0), angle);
+    }
+    es_body_desc desc = es_default_body_desc();
+    desc.name = "ring";
+    desc.type = ES_BODY_STATIC;
+    desc.node = node;
+    desc.shapes = boxes;
+    desc.shape_count = BOXES;
+    es_body body;
+    if (builder->result == ES_OK) builder->result = es_world_add_body(builder->world, &desc, &body);
+}
+
+es_result es_scene_ring(es_world* world, uint32_t triangles)
+{
+    es_scene_builder builder = {world, ES_OK};
+    float scale = triangles ? es_sqrt((float)triangles / 10500.0f) : 1;
+    uint32_t around = (uint32_t)es_maxf(16, 128 * scale), weave = (uint32_t)es_maxf(8, 64 * scale);
+    es_material table = es_build_lambert(&builder, "table", 0.66f, 0.62f, 0.56f), wall = es_build_lambert(&builder, "wall", 0.60f, 0.58f, 0.55f);
+    es_build_static_box(&builder, "table", es_v3(-2.2f, -0.1f, -2.2f), es_v3(2.2f, 0, 2.2f), table);
+    es_build_static_box(&builder, "wall", es_v3(-2.2f, 0, -2.3f), es_v3(2.2f, 2.4f, -2.2f), wall);
+
+    es_material_desc metal = es_default_material_desc();
+    metal.model = ES_SURFACE_PHONG;
+    metal.base_color[0] = 0.16f;
+    metal.base_color[1] = 0.12f;
+    metal.base_color[2] = 0.07f;
+    metal.specular = 0.72f;
+    metal.exponent = 50;
+    const es_vec2 profile[] = {{radius, 0}, {radius + thickness, 0}, {radius + thickness, height}, {radius, height}, {radius, 0}};
+    es_shape shape = es_build_shape(&builder);
+    es_shape_lathe(&shape, es_v3(0, 0, 0), profile, 5, around);
+    es_node ring = es_build_object(&builder, "ring", &shape, es_build_material(&builder, "polished bronze", &metal), es_v3(0, 0, 0));
+    add_ring_body(&builder, ring);
+
+    es_material_desc silk = es_default_material_desc();
+    silk.base_color[0] = 0.62f;
+    silk.base_color[1] = 0.11f;
+    silk.base_color[2] = 0.10f;
+    silk.specular = 0;
+    es_node node;
+    es_mesh mesh = es_build_sheet(&builder, "silk", es_v3(-0.80f, 1.15f, 0.40f), es_v3(1.0f, 0.30f, 0), es_v3(0, 0.1f, -1.0f), weave, weave, &silk, &node);
+    es_soft_desc cloth = es_default_soft_desc();
+    cloth.name = "silk";
+    cloth.mesh = mesh;
+    cloth.node = node;
+    cloth.mass = 0.35f;
+    cloth.bend_compliance = 2;
+    cloth.self_collision = true;
+    cloth.thickness = 0.012f;
+    es_soft soft;
+    if (builder.result == ES_OK) builder.result = es_world_add_soft(world, &cloth, &soft);
+
+    es_build_camera(&builder, es_v3(0.25f, 1.75f, 2.35f), es_v3(-0.10f, -0.62f, -1), 0.72f, 0.05f);
+    es_node lamp = es_build_spot(&builder, es_v3(2.3f, 2.3f, 0.9f), es_v3(-2.3f, -2.1f, -0.9f), (const float[3]){1.0f, 0.93f, 0.82f}, 60, 0.30f, 0.42f);
+    es_mover_desc sway = es_default_mover_desc();
+    sway.type = ES_MOVER_SWING;
+    sway.node = lamp;
+    sway.centre = es_v3(0, 2.3f, 0);
+    sway.arm = es_v3(2.3f, 0, 0.9f);
+    sway.keep_rotation = true;
+    sway.period = 9;
+    sway.amplitude = 0.35f;
+    es_build_mover(&builder, &sway);
+    es_build_mover(&builder, &(es_mover_desc){.type = ES_MOVER_AIM, .node = lamp, .centre = es_v3(0, 0.2f, 0)});
+    return builder.result;
+}
