@@ -142,6 +142,9 @@ size_t bench_scale_rows(bench_row* rows, size_t capacity);
 /* bench_dynamics.c */
 int bench_dynamics(const bench_options* options);
 size_t bench_dynamics_rows(bench_row* rows, size_t capacity);
+/* bench_time.c */
+int bench_time(const bench_options* options);
+size_t bench_time_rows(bench_row* rows, size_t capacity);
 /* bench_ledger.c */
 int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */

@@ -16,6 +16,7 @@ typedef struct es_compose_job {
     const float* irradiance[3];   /* indirect irradiance on the diffuse part, NULL: none */
     const float* specular[3];     /* indirect radiance reflected by the lobe, NULL: none */
     const float* compensation[3]; /* further reflected indirect radiance, of either sign; NULL: none */
+    const float* finished[3];     /* the radiance itself, in place of all of the above; NULL: it is to be made */
     float exposure_scale;         /* 2^stops */
     float white;                  /* Reinhard: the radiance that becomes 1 */
     uint32_t tone_map;            /* es_tone_map */

@@ -10,6 +10,7 @@
 #ifndef EARTHSHINE_GI_HISTORY_H
 #define EARTHSHINE_GI_HISTORY_H
 
+#include "gi/antialias.h"
 #include "gi/gi.h"
 #include "gi/temporal.h"
 
@@ -32,12 +33,16 @@ typedef struct es_history {
     bool wanted;               /* something uses history */
     bool continuous, moving;   /* it goes on from the last; something moved since */
     uint32_t still;            /* frames since the last change, 0 in one that differs */
-    bool settled;
+    bool settled, resting;     /* it is made from this frame alone; the one before was so too */
 
     es_gbuffer gbuffer, half;  /* last frame's, where it was drawn anew this frame; otherwise the renderer's own are */
     es_planes irradiance[2], specular[2];
     uint32_t current;          /* which of them is the last result */
     uint32_t planes;           /* that it has: 0, 3, 6 */
+    es_planes fresh, picture[2]; /* radiance of this picture alone, and of what anti-aliasing made of it and those before */
+    uint32_t current_picture;
+    bool has_picture;
+    uint32_t place;            /* inside of pixels, of this picture */
     es_temporal_job job;       /* of the last result, for the image of its confidence; gbuffer NULL: none */
 } es_history;
 

@@ -97,7 +97,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = ES_OK;
-    if (s->half_resolution && r->history.wanted && r->half.memory && !plan->stats[ES_PASS_VISIBILITY].skipped) result = es_history_keep(r->context, &r->half, &r->history.half);
+    if (s->half_resolution && s->temporal && r->half.memory && !plan->stats[ES_PASS_VISIBILITY].skipped) result = es_history_keep(r->context, &r->half, &r->history.half);
     if (s->half_resolution && !result) result = es_gbuffer_halve(r->context, &r->gbuffer, &r->half);
     if (!result) result = es_indirect_shade(r, r->vpl_count, &r->irradiance, &r->specular);
     const es_gbuffer* shaded = es_indirect_gbuffer(r);

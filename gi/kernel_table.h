@@ -2,6 +2,7 @@
 #ifndef EARTHSHINE_GI_KERNEL_TABLE_H
 #define EARTHSHINE_GI_KERNEL_TABLE_H
 
+#include "gi/antialias.h"
 #include "gi/compose.h"
 #include "gi/direct.h"
 #include "gi/error/flip.h"
@@ -28,6 +29,7 @@
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
+    X(antialias, (const es_antialias_job* job, uint32_t row_begin, uint32_t row_end))                            \
     /* a row of tiles */                                                                                          \
     X(temporal_compare, (const es_temporal_job* job, uint32_t tile_row, float* shares))                          \
     X(temporal_blend, (const es_temporal_job* job, uint32_t row_begin, uint32_t row_end))                        \

@@ -23,6 +23,7 @@
     X(FILTER, "filter", "pixels")                                                                                \
     X(TEMPORAL, "temporal coherence", "pixels")                                                                  \
     X(UPSAMPLE, "upsample", "pixels")                                                                            \
+    X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \
     X(COMPOSE, "compose", "pixels")
 
 typedef enum es_pass {

@@ -182,7 +182,7 @@ static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
     uint64_t moving = in->revisions.moving ? in->revisions.steps : 0;
     es_plan_reads(&r->plan, &moving, sizeof moving);
     if (!es_plan_run(&r->plan, ES_PASS_VISIBILITY)) return ES_OK;
-    es_result result = r->history.wanted ? es_history_keep(r->context, &r->gbuffer, &r->history.gbuffer) : ES_OK;
+    es_result result = r->settings.temporal ? es_history_keep(r->context, &r->gbuffer, &r->history.gbuffer) : ES_OK;
     if (!result) result = es_draw_gbuffer(r->rasterizer, in->list, &r->view, &r->gbuffer, &r->stats.raster);
     if (!result) es_plan_done(&r->plan, ES_PASS_VISIBILITY, r->stats.raster.triangles);
     return result;
@@ -407,6 +407,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];
         if (r->plan.valid[ES_PASS_SHADING] && r->has_specular) job.specular[k] = specular->at[k];
         if (r->plan.valid[ES_PASS_COMPENSATION]) job.compensation[k] = r->compensation.at[k];
+        if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
     return job;
 }
@@ -423,6 +424,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
+    es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_COMPOSE)) return;
@@ -433,6 +435,26 @@ static void pass_compose(es_renderer* r)
 }
 
 /* ---- the frame ------------------------------------------------------------------------------------------------------------------ */
+
+static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_world* world, uint32_t picture)
+{
+    es_antialias_aim(r, picture);
+    r->rays = es_pixel_rays_of_view(&r->view);
+    es_result result = pass_visibility(r, in);
+    if (!result) result = pass_light_views(r, in);
+    if (!result) result = pass_vpls(r, in);
+    if (!result) result = pass_maps(r, in);
+    if (!result) result = es_pass_hierarchy(r, in, world);
+    if (!result) result = pass_direct(r, in);
+    if (!result) result = es_pass_shading(r, in);
+    if (!result) result = es_pass_compensation(r, in);
+    const bool first = r->settings.temporal_stage == ES_TEMPORAL_BEFORE_FILTER;
+    if (!result && first) result = es_pass_temporal(r, in);
+    if (!result) result = es_pass_filter(r, in);
+    if (!result && !first) result = es_pass_temporal(r, in);
+    if (!result) result = es_pass_upsample(r, in);
+    return result ? result : es_pass_antialias(r, picture);
+}
 
 static es_result render(es_renderer* r, es_world* world)
 {
@@ -454,22 +476,13 @@ static es_result render(es_renderer* r, es_world* world)
     r->frame = (es_frame_settings){*s, in.extent};
     result = es_history_begin(r, &in, world);
     if (result) return result;
-    r->rays = es_pixel_rays_of_view(&r->view);
-
     es_plan_begin_frame(&r->plan, s->skip);
-    result = pass_visibility(r, &in);
-    if (!result) result = pass_light_views(r, &in);
-    if (!result) result = pass_vpls(r, &in);
-    if (!result) result = pass_maps(r, &in);
-    if (!result) result = es_pass_hierarchy(r, &in, world);
-    if (!result) result = pass_direct(r, &in);
-    if (!result) result = es_pass_shading(r, &in);
-    if (!result) result = es_pass_compensation(r, &in);
-    const bool first = s->temporal_stage == ES_TEMPORAL_BEFORE_FILTER;
-    if (!result && first) result = es_pass_temporal(r, &in);
-    if (!result) result = es_pass_filter(r, &in);
-    if (!result && !first) result = es_pass_temporal(r, &in);
-    if (!result) result = es_pass_upsample(r, &in);
+    /* several pictures that are to come out as they did: there is nothing to do for any */
+    const bool stands = s->skip && s->antialias == ES_ANTIALIAS_SUPERSAMPLE && r->history.resting && r->plan.valid[ES_PASS_ANTIALIAS];
+    if (stands)
+        for (int i = 0; i < ES_PASS_COUNT; i++) r->plan.stats[i].skipped = "the picture has settled";
+    const uint32_t pictures = stands ? 0 : es_antialias_pictures(s);
+    for (uint32_t i = 0; i < pictures && !result; i++) result = draw_picture(r, &in, world, i);
     if (!result) pass_compose(r);
     if (!result) es_history_end(&r->history);
     return result;

@@ -86,6 +86,10 @@ void es_history_free(es_context* context, es_history* history);
 /* Before `drawn` is drawn anew: what it holds goes to `last`. */
 es_result es_history_keep(es_context* context, es_gbuffer* drawn, es_gbuffer* last);
 es_result es_pass_temporal(es_renderer* renderer, const es_frame_inputs* in);
+/* Pictures that a frame is the mean of, and of each: sets the renderer's view; blends the picture (gi/antialias_pass.c). */
+uint32_t es_antialias_pictures(const es_renderer_settings* settings);
+void es_antialias_aim(es_renderer* renderer, uint32_t picture);
+es_result es_pass_antialias(es_renderer* renderer, uint32_t picture);
 /* Of the last frame, a plane as the ones that are blended; 0 where there was no history. */
 es_result es_temporal_confidence(es_renderer* renderer, float* confidence);
 /* The job of the compose pass for the frame as it stands; outputs are for the caller to set. */

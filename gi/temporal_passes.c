@@ -82,10 +82,10 @@ es_result es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_w
     es_history* h = &r->history;
     const es_renderer_settings* s = &r->settings;
     const bool goes_on = h->complete;
-    h->complete = h->continuous = h->settled = false;
+    h->complete = h->continuous = h->settled = h->resting = false;
     h->moving = true;
     h->job.gbuffer = NULL;
-    h->wanted = s->temporal;
+    h->wanted = s->temporal || s->antialias != ES_ANTIALIAS_NONE;
     if (!h->wanted) {
         es_history_free(r->context, h);
         return ES_OK;
@@ -107,7 +107,9 @@ es_result es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_w
     content = es_hash_bytes(content, words, sizeof words);
     content = es_hash_bytes(content, &s->exposure, sizeof s->exposure);
     h->still = h->continuous && !h->moving && content == h->content ? h->still + (h->still < UINT32_MAX) : 0;
-    h->settled = h->still >= s->temporal_settle;
+    const uint32_t settle = s->temporal || s->antialias == ES_ANTIALIAS_TEMPORAL ? s->temporal_settle : 0;
+    h->settled = h->still >= settle;
+    h->resting = h->still > settle;
     if (!h->continuous) h->planes = 0;
     h->alert = h->continuous ? es_maxf(light_change(h, in, origin), h->alert > 0.01f ? 0.5f * h->alert : 0.0f) : 0.0f;
 
@@ -131,7 +133,10 @@ void es_history_free(es_context* context, es_history* h)
     for (int i = 0; i < 2; i++) {
         es_planes_free(context, &h->irradiance[i]);
         es_planes_free(context, &h->specular[i]);
+        es_planes_free(context, &h->picture[i]);
     }
+    es_planes_free(context, &h->fresh);
+    h->has_picture = false;
     es_release(context, h->lights, h->light_capacity * sizeof *h->lights);
     h->lights = NULL;
     h->light_count = h->light_capacity = 0;

@@ -7,7 +7,7 @@
  *
  * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
  * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps;
- * `half-temporal` and `temporal` blend light with that of the frame before;
+ * `half-temporal` and `temporal` blend light with that of the frame before, `antialiased` the picture as well;
  * `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
@@ -377,6 +377,16 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     check(context, es_renderer_render(renderer, world), "rendering");
     check(context, es_world_step(world, 1.0f / 30), "a step");
     print_images(context, renderer, world, p->name, "temporal", folder);
+    settings.antialias = ES_ANTIALIAS_TEMPORAL;
+    check(context, es_renderer_configure(renderer, &settings), "smoothing edges over frames");
+    check(context, es_renderer_render(renderer, world), "rendering");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "antialiased", folder);
+    settings.temporal = false;
+    settings.antialias = ES_ANTIALIAS_SUPERSAMPLE;
+    settings.antialias_samples = 3;
+    check(context, es_renderer_configure(renderer, &settings), "smoothing edges by several pictures");
+    print_images(context, renderer, world, p->name, "supersampled", folder);
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);

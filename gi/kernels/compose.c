@@ -42,52 +42,60 @@ static inline vf display_range(vf a) { return vf_min(vf_max(a, vf_zero()), vf_se
 /* a in [0, 1]; with a power instead of the table the pass took more than twice as long */
 static inline vi srgb8(const es_srgb_table* table, vf a) { return vi_gather(table->code, vi_round(vf_sqrt(a) * vf_set1((float)(ES_SRGB_TABLE_SIZE - 1)))); }
 
+/* From its parts; stores the indirect one where it is wanted. */
+VINL rgb_v radiance_at(const es_compose_job* job, size_t at)
+{
+    const es_gbuffer* g = job->gbuffer;
+    vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at), surface = vi_load(g->surface + at);
+    rgb_v albedo = {es_unpack_unorm16_v(rg), es_unpack_unorm16_v(vi_shift_right_logical(rg, 16)), es_unpack_unorm16_v(b)};
+    rgb_v c;
+    es_unpack_rgb9e5_v(vi_load(g->emission + at), &c.r, &c.g, &c.b);
+    vm unlit = vi_eq(vi_shift_right_logical(surface, 24), vi_set1(ES_SURFACE_UNLIT)) & vm_gt(vf_load(g->depth + at), vf_zero());
+    c.r = c.r + vf_and(unlit, albedo.r);
+    c.g = c.g + vf_and(unlit, albedo.g);
+    c.b = c.b + vf_and(unlit, albedo.b);
+    if (job->direct[0]) {
+        c.r = c.r + vf_load(job->direct[0] + at);
+        c.g = c.g + vf_load(job->direct[1] + at);
+        c.b = c.b + vf_load(job->direct[2] + at);
+    }
+    rgb_v indirect = {vf_zero(), vf_zero(), vf_zero()};
+    if (job->irradiance[0]) {
+        vf metallic = vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f);
+        vf diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - metallic);
+        indirect.r = albedo.r * diffuse * vf_load(job->irradiance[0] + at);
+        indirect.g = albedo.g * diffuse * vf_load(job->irradiance[1] + at);
+        indirect.b = albedo.b * diffuse * vf_load(job->irradiance[2] + at);
+    }
+    if (job->specular[0]) {
+        indirect.r = indirect.r + vf_load(job->specular[0] + at);
+        indirect.g = indirect.g + vf_load(job->specular[1] + at);
+        indirect.b = indirect.b + vf_load(job->specular[2] + at);
+    }
+    if (job->compensation[0]) {
+        indirect.r = indirect.r + vf_load(job->compensation[0] + at);
+        indirect.g = indirect.g + vf_load(job->compensation[1] + at);
+        indirect.b = indirect.b + vf_load(job->compensation[2] + at);
+    }
+    indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
+    c.r = c.r + indirect.r;
+    c.g = c.g + indirect.g;
+    c.b = c.b + indirect.b;
+    if (job->indirect[0]) {
+        vf_store(job->indirect[0] + at, indirect.r);
+        vf_store(job->indirect[1] + at, indirect.g);
+        vf_store(job->indirect[2] + at, indirect.b);
+    }
+    return c;
+}
+
 void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uint32_t row_end)
 {
     const es_gbuffer* g = job->gbuffer;
     for (uint32_t y = row_begin; y < row_end; y++) {
         for (uint32_t x = 0; x < g->width; x += VW) {
             size_t at = (size_t)y * g->stride + x;
-            vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at), surface = vi_load(g->surface + at);
-            rgb_v albedo = {es_unpack_unorm16_v(rg), es_unpack_unorm16_v(vi_shift_right_logical(rg, 16)), es_unpack_unorm16_v(b)};
-            rgb_v c;
-            es_unpack_rgb9e5_v(vi_load(g->emission + at), &c.r, &c.g, &c.b);
-            vm unlit = vi_eq(vi_shift_right_logical(surface, 24), vi_set1(ES_SURFACE_UNLIT)) & vm_gt(vf_load(g->depth + at), vf_zero());
-            c.r = c.r + vf_and(unlit, albedo.r);
-            c.g = c.g + vf_and(unlit, albedo.g);
-            c.b = c.b + vf_and(unlit, albedo.b);
-            if (job->direct[0]) {
-                c.r = c.r + vf_load(job->direct[0] + at);
-                c.g = c.g + vf_load(job->direct[1] + at);
-                c.b = c.b + vf_load(job->direct[2] + at);
-            }
-            rgb_v indirect = {vf_zero(), vf_zero(), vf_zero()};
-            if (job->irradiance[0]) {
-                vf metallic = vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f);
-                vf diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - metallic);
-                indirect.r = albedo.r * diffuse * vf_load(job->irradiance[0] + at);
-                indirect.g = albedo.g * diffuse * vf_load(job->irradiance[1] + at);
-                indirect.b = albedo.b * diffuse * vf_load(job->irradiance[2] + at);
-            }
-            if (job->specular[0]) {
-                indirect.r = indirect.r + vf_load(job->specular[0] + at);
-                indirect.g = indirect.g + vf_load(job->specular[1] + at);
-                indirect.b = indirect.b + vf_load(job->specular[2] + at);
-            }
-            if (job->compensation[0]) {
-                indirect.r = indirect.r + vf_load(job->compensation[0] + at);
-                indirect.g = indirect.g + vf_load(job->compensation[1] + at);
-                indirect.b = indirect.b + vf_load(job->compensation[2] + at);
-            }
-            indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
-            c.r = c.r + indirect.r;
-            c.g = c.g + indirect.g;
-            c.b = c.b + indirect.b;
-            if (job->indirect[0]) {
-                vf_store(job->indirect[0] + at, indirect.r);
-                vf_store(job->indirect[1] + at, indirect.g);
-                vf_store(job->indirect[2] + at, indirect.b);
-            }
+            rgb_v c = job->finished[0] ? (rgb_v){vf_load(job->finished[0] + at), vf_load(job->finished[1] + at), vf_load(job->finished[2] + at)} : radiance_at(job, at);
             if (job->radiance[0]) {
                 vf_store(job->radiance[0] + at, c.r);
                 vf_store(job->radiance[1] + at, c.g);
