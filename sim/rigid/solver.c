@@ -55,8 +55,8 @@ void es_solver_free(es_context* context, es_solver* solver)
 /* R M Rᵀ of a symmetric matrix. */
 static void turned(es_quat q, const float m[6], float out[6])
 {
-    es_vec3 x = es_quat_rotate(q, es_v3(1, 0, 0)), y = es_quat_rotate(q, es_v3(0, 1, 0)), z = es_quat_rotate(q, es_v3(0, 0, 1));
-    const float r[3][3] = {{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}};
+    float xx = q.x * q.x, yy = q.y * q.y, zz = q.z * q.z, xy = q.x * q.y, xz = q.x * q.z, yz = q.y * q.z, wx = q.w * q.x, wy = q.w * q.y, wz = q.w * q.z;
+    const float r[3][3] = {{1 - 2 * (yy + zz), 2 * (xy - wz), 2 * (xz + wy)}, {2 * (xy + wz), 1 - 2 * (xx + zz), 2 * (yz - wx)}, {2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy)}};
     const float s[3][3] = {{m[0], m[3], m[4]}, {m[3], m[1], m[5]}, {m[4], m[5], m[2]}};
     float t[3][3];
     for (int i = 0; i < 3; i++)
