@@ -235,6 +235,27 @@ static void write_dwa(void)
         }
 }
 
+/* ---- shapes of bodies ---------------------------------------------------------------------------------------------------------------- */
+
+/* Numbers without a pattern; the byte that says which shape takes every value in turn. */
+static void write_shapes(void)
+{
+    uint32_t state = 1;
+    for (uint32_t seed = 0; seed < 25; seed++) {
+        uint8_t bytes[600];
+        for (size_t i = 0; i < sizeof bytes; i++) {
+            state = state * 1664525u + 1013904223u;
+            bytes[i] = (uint8_t)(state >> 24);
+            if (i % 3 == 1 && bytes[i] == 255) bytes[i] = 0; /* any bits at all are for the fuzzer to find */
+        }
+        bytes[0] = 1; /* two triangles: 18 numbers of 3 bytes, then the first shape's kind */
+        bytes[1 + 18 * 3] = (uint8_t)(seed % 5 + 5 * (seed / 5));
+        char name[16];
+        snprintf(name, sizeof name, "pair-%02u", seed);
+        put("shapes", name, bytes, sizeof bytes);
+    }
+}
+
 /* ---- glTF, settings, references -------------------------------------------------------------------------------------------------------- */
 
 /* GLB around a text and 1 KiB of data. */
@@ -307,6 +328,7 @@ int main(int count, char** arguments)
 #endif
     write_dwa();
     write_resumes();
+    write_shapes();
     put("settings", "one", "cornell\n--size=16x16\n--hash", 27);
     static const char glb_text[] =
         "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
