@@ -101,7 +101,7 @@ typedef enum bench_peer_kind {
     BENCH_LLVMPIPE,    /* its programs for drawing, shading and starting */
     BENCH_EMBREE_RAYS, /* building and tracing rays: rows as "primary intersect1 70k" */
     BENCH_EMBREE_PATHS, /* one diffuse bounce by path tracing, demos/bench_embree_paths.c */
-    BENCH_BULLET        /* rigid bodies */
+    BENCH_BULLET        /* rigid bodies; cloth */
 } bench_peer_kind;
 typedef struct bench_peer {
     bench_peer_kind kind;
@@ -139,12 +139,14 @@ size_t bench_error_rows(bench_row* rows, size_t capacity);
 /* bench_scale.c */
 int bench_scale(const bench_options* options);
 size_t bench_scale_rows(bench_row* rows, size_t capacity);
-/* bench_dynamics.c */
+/* bench_dynamics.c, bench_cloth.c */
 int bench_dynamics(const bench_options* options);
 size_t bench_dynamics_rows(bench_row* rows, size_t capacity);
 /* bench_time.c */
 int bench_time(const bench_options* options);
 size_t bench_time_rows(bench_row* rows, size_t capacity);
+/* n × n points, so many steps: the median step, the most stretched edge and the deepest place in the sphere (m, negative: none) at the end. */
+bool bench_cloth(uint32_t n, uint32_t threads, uint32_t steps, double* milliseconds, double* stretch, double* deepest);
 /* bench_ledger.c */
 int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */

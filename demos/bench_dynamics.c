@@ -1,4 +1,4 @@
-/* `bench dynamics`: the peers' scenes of rigid bodies, simulated here and by Bullet turn by turn in one sitting.
+/* `bench dynamics`: the peers' scenes of rigid bodies and cloth, simulated here and by Bullet turn by turn in one sitting.
  *
  * 60 steps a second, nothing falls asleep, friction 0.6, the same boxes to the last bit: a pyramid of 210 cubes, and 1000 boxes dropped between four
  * walls. A step is es_world_step, poses and bounds of nodes included. Bullet's world runs on one thread: it has no other in Debian's build. */
@@ -8,16 +8,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BASE = 20, PYRAMID = BASE * (BASE + 1) / 2, DROPPED = 1000, EARLY_FROM = 60, EARLY_TO = 240, LATE_FROM = 900, STEPS = 1200, MAX_ROUNDS = 50 };
-typedef enum figure { PYRAMID_TIME, PYRAMID_LATE, DROP_TIME, DROP_LATE, DRIFT, FIGURES } figure;
+enum { BASE = 20, PYRAMID = BASE * (BASE + 1) / 2, DROPPED = 1000, EARLY_FROM = 60, EARLY_TO = 240, LATE_FROM = 900, STEPS = 1200, CLOTH_STEPS = 600, MAX_ROUNDS = 50 };
+typedef enum figure { PYRAMID_TIME, PYRAMID_LATE, DROP_TIME, DROP_LATE, DRIFT, CLOTH_64, CLOTH_128, STRETCH_64, STRETCH_128, FIGURES } figure;
 
 #define TEN "Bullet, 10 iterations"
+#define TWENTY "Bullet, 20 iterations"
 static const bench_row table[FIGURES] = {
     [PYRAMID_TIME] = {"pyramid-210", "pyramid of 210 cubes, a step between second 1 and 4", "ms", TEN, BENCH_RATIO_AT_LEAST, 1 / 0.6, 1 / 0.3},
     [PYRAMID_LATE] = {"pyramid-210-late", "the same between second 15 and 20", "ms", TEN, BENCH_RATIO_AT_LEAST, 1 / 0.6, 1 / 0.3},
     [DROP_TIME] = {"drop-1000", "1000 boxes dropped, a step between second 1 and 4", "ms", TEN, BENCH_RATIO_AT_LEAST, 1 / 0.6, 1 / 0.3},
     [DROP_LATE] = {"drop-1000-late", "the same between second 15 and 20", "ms", TEN, BENCH_RATIO_AT_LEAST, 1 / 0.6, 1 / 0.3},
     [DRIFT] = {"pyramid-drift", "largest movement of a cube of the pyramid between second 1 and 20", "m", TEN ", since the start", BENCH_VALUE_AT_MOST, 0.03, 0.003},
+    [CLOTH_64] = {"cloth-64", "cloth of 64 by 64 points hung over a sphere, a step", "ms", TWENTY, BENCH_RATIO_AT_LEAST, 1, 2},
+    [CLOTH_128] = {"cloth-128", "cloth of 128 by 128 points hung over a sphere, a step", "ms", TWENTY, BENCH_RATIO_AT_LEAST, 1, 2},
+    [STRETCH_64] = {"cloth-64-stretch", "its most stretched edge, after 10 s", "x", TWENTY, BENCH_VALUE_AT_MOST, 1.1, 1.1},
+    [STRETCH_128] = {"cloth-128-stretch", "its most stretched edge, after 10 s", "x", TWENTY, BENCH_VALUE_AT_MOST, 1.1, 1.1},
 };
 
 size_t bench_dynamics_rows(bench_row* rows, size_t capacity)
@@ -194,8 +199,18 @@ int bench_dynamics(const bench_options* options)
         values[DROP_TIME][round] = r.early;
         values[DROP_LATE][round] = r.late;
         snprintf(rows[DROP_TIME].note, sizeof rows[0].note, "highest box at the end %.2f m", r.top);
+        for (int k = 0; k < 2 && works; k++) {
+            double stretch = NAN, deepest = NAN;
+            values[CLOTH_64 + k][round] = values[STRETCH_64 + k][round] = NAN;
+            if (!bench_wants(options, table[CLOTH_64 + k].id) && !bench_wants(options, table[STRETCH_64 + k].id)) continue;
+            works = bench_cloth(k ? 128 : 64, options->threads, options->quick ? 60 : CLOTH_STEPS, &values[CLOTH_64 + k][round], &stretch, &deepest);
+            values[STRETCH_64 + k][round] = stretch;
+            snprintf(rows[CLOTH_64 + k].note, sizeof rows[0].note, "most stretched edge %.3f; a vertex is %.4f m inside of the sphere at most", stretch, fmax(deepest, 0));
+        }
+        bool rigid_peer = pyramid || drop, cloth_peer = wants_any(options, CLOTH_64, STRETCH_128);
         const char* none[] = {NULL};
-        if (with_peer && works && !bench_peer_run_program(peer, 0, none, NULL)) fprintf(stderr, "earthshine: %s\n", peer->why);
+        if (with_peer && works && rigid_peer && !bench_peer_run_program(peer, 0, none, NULL)) fprintf(stderr, "earthshine: %s\n", peer->why);
+        if (with_peer && works && cloth_peer && !bench_peer_run_program(peer, 1, none, NULL)) fprintf(stderr, "earthshine: %s\n", peer->why);
     }
     static const char* const peer_row[FIGURES][2] = {
         [PYRAMID_TIME] = {"pyramid iters10 steps 60-240", ""},
@@ -203,6 +218,10 @@ int bench_dynamics(const bench_options* options)
         [DROP_TIME] = {"drop1000 iters10 steps 60-240", ""},
         [DROP_LATE] = {"drop1000 iters10 steps 900-1200", ""},
         [DRIFT] = {"pyramid iters10 max displacement after 20 s", ""},
+        [CLOTH_64] = {"cloth 64x64 ", "20 iterations"}, /* the number of links stands between */
+        [CLOTH_128] = {"cloth 128x128 ", "20 iterations"},
+        [STRETCH_64] = {"cloth 64x64 ", "20 iterations max stretch"},
+        [STRETCH_128] = {"cloth 128x128 ", "20 iterations max stretch"},
     };
     int code = DEMO_OK;
     size_t count = 0;
@@ -231,7 +250,7 @@ int bench_dynamics(const bench_options* options)
         code = demo_refuse("bench dynamics: a scene could not be simulated");
     else {
         bench_print(shown, count);
-        bench_report report = {.name = "dynamics", .title = "Bodies beside Bullet", .about = "Ours and Bullet's, turn by turn in one sitting; medians over the rounds."};
+        bench_report report = {.name = "dynamics", .title = "Bodies and cloth beside Bullet", .about = "Ours and Bullet's, turn by turn in one sitting; medians over the rounds."};
         code = bench_report_write(&report, options, shown, count, context);
     }
     if (context) es_context_destroy(context);

@@ -31,8 +31,8 @@ static const peer_kind kinds[] = {
         NULL, "rays"},
     [BENCH_EMBREE_PATHS] = {"Embree", "embree", "embree_peer.c", {{"embree_paths", "bench_embree_paths.c", true}}, {"-O3", "-march=native", "-ffast-math"},
         {"-lembree3", "-lpthread", "-lm"}, NULL, NULL},
-    [BENCH_BULLET] = {"Bullet", "rigid", "bullet_peer.cpp", {{"bullet_peer", "bullet_peer.cpp", false}},
-        {"-O2", "-I/usr/include/bullet"}, {"-lBulletDynamics", "-lBulletCollision", "-lLinearMath", "-lstdc++", "-lm"}, NULL, NULL},
+    [BENCH_BULLET] = {"Bullet", "rigid", "bullet_peer.cpp", {{"bullet_peer", "bullet_peer.cpp", false}, {"bullet_cloth", "bullet_cloth.cpp", false}},
+        {"-O2", "-I/usr/include/bullet"}, {"-lBulletSoftBody", "-lBulletDynamics", "-lBulletCollision", "-lLinearMath", "-lstdc++", "-lm"}, NULL, NULL},
 };
 
 static bool try_folder(bench_peer* peer, const char* shared)
