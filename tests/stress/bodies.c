@@ -1,4 +1,4 @@
-/* Rigid bodies out of the ordinary: mass ratios, deep overlap, masses and hulls that must be refused, steps of 0, 1e-6 and 1 s, places far
+/* Rigid bodies out of the ordinary: mass ratios, bullets, deep overlap, masses and hulls that must be refused, steps of 0, 1e-6 and 1 s, places far
  * from zero, random shapes in random poses. Whatever is accepted stays finite and where it can be. */
 #include "tests/rigid_tools.h"
 
@@ -51,6 +51,23 @@ static void mass_ratios(void** unused)
         assert_true(length_of(l.velocity) < 0.05 && length_of(u.velocity) < 0.05);
         free_arena(&a);
     }
+}
+
+/* Balls of 5 cm at 500 m/s, spinning or not, do not pass a wall of 4 cm. */
+static void bullets(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    es_shape_desc wall = box_shape(0.02f, 5, 5), ball = ball_shape(0.05f);
+    add_body(&a, ES_BODY_STATIC, &wall, 0, 0, 0, no_turn);
+    es_body shot[6];
+    for (int i = 0; i < 6; i++) {
+        shot[i] = add_body(&a, ES_BODY_DYNAMIC, &ball, -3 - 0.731 * i, -2 + 0.8 * i, 0.3 * i, no_turn);
+        assert_int_equal(es_world_set_body_velocity(a.world, shot[i], (es_vec3){500, 0, 0}, (es_vec3){0, 0, 20.0f * (float)i}), ES_OK);
+    }
+    run(&a, 60);
+    for (int i = 0; i < 6; i++) assert_true(sound_state(&a, shot[i]).position[0] < 0); /* none came through */
+    free_arena(&a);
 }
 
 /* Forty boxes, balls and capsules in one place come apart, without being shot away. */
@@ -213,6 +230,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mass_ratios),
+        cmocka_unit_test(bullets),
         cmocka_unit_test(deep_overlap),
         cmocka_unit_test(refused),
         cmocka_unit_test(odd_steps),
