@@ -253,7 +253,7 @@ uint32_t es_soft_substeps(const es_soft_object* soft, uint32_t world_substeps)
     if (count) return count;
     float side = es_sqrt((float)soft->first_particles);
     if (soft->tetrahedron_count) side = 2 * es_exp2(es_log2((float)soft->first_particles + 1.0f) / 3);
-    count = (uint32_t)(side * 0.0875f * (float)world_substeps + 0.5f);
+    count = (uint32_t)(side * 0.075f * (float)world_substeps + 0.5f);
     return count < 2 * world_substeps ? 2 * world_substeps : count > 1024 ? 1024 : count;
 }
 
