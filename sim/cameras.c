@@ -87,6 +87,8 @@ es_result es_world_destroy_camera(es_world* world, es_camera camera)
     if (!world) return ES_INVALID_ARGUMENT;
     es_camera_object* object = camera_object(world, camera);
     if (!object) return ES_STALE_HANDLE;
+    if (object->object.references)
+        return es_misuse(world->context, ES_WRONG_STATE, "camera '%.64s' cannot be destroyed: %u things move it", object->object.name ? object->object.name : "", object->object.references);
     es_world_rereference(world, ES_OBJECT_NODE, object->desc.node.id, 0);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_CAMERA], &object->object);
     if (world->active_camera.id == camera.id) { /* the first that is left takes over */

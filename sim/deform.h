@@ -45,6 +45,7 @@ typedef struct es_mesh_drive {
     float* blended;                          /* of playing clips */
     float blended_share;                     /* of the weights of the clips in `blended` */
     bool blending;
+    uint32_t played_by;                      /* the clip that took the mesh when the world was opened */
     uint32_t skin;                           /* handle; 0: none */
     float* chunk_bounds;                     /* 8 floats per task */
     bool stale;                              /* the vertices were never computed or belong to another state */

@@ -17,7 +17,7 @@
  * some 50 KiB of stack. */
 enum { MAX_DEPTH = 128 };
 
-const char* const es_gltf_extensions[] = {"KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular",
+const char* const es_gltf_extensions[] = {"KHR_animation_pointer", "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular",
     "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform", NULL};
 
 typedef struct span { const char* begin; size_t size; } span;
@@ -35,6 +35,7 @@ typedef struct parser {
     uint32_t depth;
     uint32_t ignored;           /* depth at which extras or an extension began; 0: outside */
     bool seen_buffers, seen_images, seen_meshes;
+    bool target_names_node;     /* of the channel's target that is being read */
     bool has_version, has_minimum;
     uint32_t version[2], minimum[2];
     char extension[ES_GLTF_PRINTABLE];
@@ -441,6 +442,7 @@ static bool read_key(parser* p)
     if (p->at == p->end || *p->at != ':') { return syntax(p, "':' is expected"); }
     p->at++;
     if (p->ignored) { return true; }
+    if (p->depth == 6 && is(top->key, "node")) { p->target_names_node = true; }
     if (is(top->key, "extras") || is(top->key, "extensions")) {
         p->ignored = p->depth;
     } else if (escaped) {
@@ -451,6 +453,12 @@ static bool read_key(parser* p)
         return emit_up_to(p, top->key.begin) && emit(p, "_", 1);
     }
     return true;
+}
+
+/* Inside of an animation channel's target? */
+static bool in_channel_target(const parser* p)
+{
+    return p->depth == 6 && !p->ignored && p->stack[5].object && is(p->stack[4].key, "target") && is(p->stack[2].key, "channels") && is(p->stack[0].key, "animations");
 }
 
 static bool read_number(parser* p, span* text)
@@ -517,6 +525,7 @@ static bool parse(parser* p)
                 if (!found(p, c == '{' ? VALUE_OBJECT : VALUE_ARRAY, text, false)) { return false; }
                 if (p->depth == MAX_DEPTH) { return syntax(p, "is nested deeper than 128 levels"); }
                 p->stack[p->depth++] = (level){.object = c == '{', .key = {"", 0}};
+                if (p->depth == 6) { p->target_names_node = false; }
                 p->at++;
                 skip_space(p);
                 if (p->at < p->end && *p->at == (c == '{' ? '}' : ']')) { continue; }
@@ -548,6 +557,12 @@ static bool parse(parser* p)
                 if (top->object && !read_key(p)) { return false; }
                 state = BEFORE_VALUE;
             } else if (*p->at == (top->object ? '}' : ']')) {
+                if (in_channel_target(p) && !p->target_names_node) {
+                    /* tinygltf drops channels without a node, as those of KHR_animation_pointer are */
+                    const char* none = ",\"node\":-1";
+                    if (top->key.size == 0) { none++; }
+                    if (!emit_up_to(p, p->at) || !emit(p, none, strlen(none))) { return false; }
+                }
                 p->at++;
                 p->depth--;
             } else {

@@ -14,6 +14,7 @@
 #include <new>
 #include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <tiny_gltf.h>
@@ -144,6 +145,7 @@ uint32_t load_unsigned(const uint8_t* at, int type)
 struct geometry {
     list<float> positions, normals, tangents, uv0, uv1, colors;
     list<uint32_t> indices;
+    std::vector<list<float>> targets; /* displacements of positions, normals and tangents of one target after another; empty: none */
     explicit geometry(es_context* c)
         : positions(counted<float>(c)), normals(counted<float>(c)), tangents(counted<float>(c)), uv0(counted<float>(c)),
           uv1(counted<float>(c)), colors(counted<float>(c)), indices(counted<uint32_t>(c))
@@ -153,9 +155,9 @@ struct geometry {
 
 /* What is warned of once per file, after it was read. */
 struct left_out {
-    size_t lines_and_points = 0, partial_triangles = 0, blended = 0, skins = 0, morphs = 0, weights = 0, sheared = 0;
-    size_t tinted_specular = 0, specular_textures = 0, sourceless_textures = 0, uv_sets = 0, dropped_channels = 0;
-    std::string blended_name, sheared_name;
+    size_t lines_and_points = 0, partial_triangles = 0, blended = 0, sheared = 0;
+    size_t tinted_specular = 0, specular_textures = 0, sourceless_textures = 0, uv_sets = 0, dropped_channels = 0, dropped_pointers = 0, weightless = 0;
+    std::string blended_name, sheared_name, pointer_name;
 };
 
 class importer
@@ -187,6 +189,7 @@ class importer
         check_nodes();
         choose_roots();
         add_nodes();
+        find_weighted_nodes();
         add_instances();
         add_lights();
         add_cameras();
@@ -222,6 +225,10 @@ class importer
     std::vector<es_material> materials;     /* null: not yet made; the last is glTF's default material */
     std::map<std::pair<int, bool>, es_texture> textures; /* by image and sRGB */
     std::map<std::vector<int64_t>, es_mesh> meshes;      /* by everything a primitive's vertices come from */
+    std::set<size_t> weighted_nodes;        /* whose morph weights an animation moves: their meshes are shared with no other node */
+    std::map<size_t, std::vector<es_mesh>> morphed_meshes;   /* by node */
+    std::map<size_t, std::vector<es_light>> lights;          /* by number in the file */
+    std::map<size_t, std::vector<es_camera>> cameras;
     uint64_t vertex_total = 0, elements_read = 0;
     size_t instance_total = 0;
     size_t reserved = 0;                    /* of the context's count, for what tinygltf and the containers here allocate by themselves */
@@ -715,14 +722,27 @@ class importer
     void add_nodes()
     {
         nodes.assign(model.nodes.size(), es_node{0});
-        for (int each : order) {
-            size_t n = static_cast<size_t>(each);
-            es_node_desc desc{};
-            desc.name = model.nodes[n].name.c_str();
-            desc.parent = parents[n] < 0 ? es_node{0} : nodes[static_cast<size_t>(parents[n])];
-            desc.transform = transforms[n];
-            check(es_world_add_node(world, &desc, &nodes[n]));
+        for (int each : order) { add_node(static_cast<size_t>(each)); }
+    }
+
+    void add_node(size_t n)
+    {
+        es_node_desc desc{};
+        desc.name = model.nodes[n].name.c_str();
+        desc.parent = parents[n] < 0 ? es_node{0} : nodes[static_cast<size_t>(parents[n])];
+        desc.transform = transforms[n];
+        check(es_world_add_node(world, &desc, &nodes[n]));
+    }
+
+    /* Joints may lie outside of the scene that is shown. */
+    es_node node_of_joint(size_t n)
+    {
+        std::vector<size_t> missing;
+        for (int each = static_cast<int>(n); each >= 0 && nodes[static_cast<size_t>(each)].id == 0; each = parents[static_cast<size_t>(each)]) {
+            missing.push_back(static_cast<size_t>(each));
         }
+        for (size_t i = missing.size(); i-- > 0;) { add_node(missing[i]); }
+        return nodes[n];
     }
 
     /* ---- §3.8: images, samplers, textures ------------------------------------------------------------------------------------------ */
@@ -1071,106 +1091,167 @@ class importer
         }
     }
 
-    /* §3.7.2.2: base + sum of weight times displacement */
-    void morph(const tinygltf::Primitive& primitive, const std::vector<float>& weights, const std::string& where, geometry& g)
+    /* §3.7.2.2: displacements of what the primitive itself has */
+    void read_targets(const tinygltf::Primitive& primitive, const std::string& where, geometry& g)
     {
-        list<float> displacement{counted<float>(context)};
         size_t vertex_count = g.positions.size() / 3;
         for (size_t t = 0; t < primitive.targets.size(); t++) {
             std::string target = where + ".targets[" + std::to_string(t) + "].";
+            for (size_t k = 0; k < 3; k++) { g.targets.emplace_back(counted<float>(context)); }
             for (const auto& part : primitive.targets[t]) {
-                list<float>* base = part.first == "POSITION" ? &g.positions : part.first == "NORMAL" ? &g.normals : part.first == "TANGENT" ? &g.tangents : nullptr;
-                if (!base || base->empty()) { continue; }
+                size_t stream = part.first == "POSITION" ? 0 : part.first == "NORMAL" ? 1 : part.first == "TANGENT" ? 2 : 3;
+                if (stream == 3 || (stream == 1 && g.normals.empty()) || (stream == 2 && g.tangents.empty())) { continue; }
+                list<float>& displacement = g.targets[3 * t + stream];
+                const elements& e = accessor(part.second, target + part.first);
+                if (!e.data && e.sparse_count == 0 && e.components == 3) { /* all zero: nothing to keep */
+                    check_count(e.count, vertex_count, target + part.first);
+                    spend(e.count, target + part.first);
+                    continue;
+                }
+                count_vertices(vertex_count, target + part.first);
                 read_floats(part.second, 3, target + part.first, displacement);
                 check_count(displacement.size() / 3, vertex_count, target + part.first);
-                size_t width = base == &g.tangents ? 4 : 3;
-                for (size_t i = 0; i < vertex_count && weights[t] != 0; i++) {
-                    for (size_t c = 0; c < 3; c++) { (*base)[width * i + c] += weights[t] * displacement[3 * i + c]; }
-                }
             }
         }
-        check_values(g.positions, 3, where + " morphed by its default weights", attribute(primitive, "POSITION"));
-        check_values(g.normals, 3, where + " morphed by its default weights", attribute(primitive, "NORMAL"));
-        check_values(g.tangents, 4, where + " morphed by its default weights", attribute(primitive, "TANGENT"));
     }
 
-    /* §3.7.3: vertices by the joints' matrices, sum over weight * (joint to world) * (inverse bind); the node's own transform
-     * does not count. Weights are made to sum to one, which quantised ones miss by a little. */
-    void skin(const tinygltf::Primitive& primitive, size_t skin_index, const std::string& where, geometry& g)
+    /* §3.7.3: the nodes and weights that move a mesh. The mesh's vertices are written in the axes of the joints' nearest common ancestor, whose
+     * movements then move the instance and not its vertices; the node that carries mesh and skin does not count. */
+    void add_skin(const tinygltf::Primitive& primitive, size_t skin_index, const std::string& where, size_t vertex_count, es_mesh mesh)
     {
         const tinygltf::Skin& from = model.skins[skin_index];
         std::string skin_where = at("skins", skin_index);
-        size_t joint_count = from.joints.size(), vertex_count = g.positions.size() / 3;
-        if (joint_count == 0) { refuse(ES_FILE_DAMAGED, "%s.joints: must name at least one node", skin_where.c_str()); }
+        size_t joint_count = from.joints.size();
         list<float> bind{counted<float>(context)};
-        if (from.inverseBindMatrices >= 0) {
-            read_floats(from.inverseBindMatrices, 16, skin_where + ".inverseBindMatrices", bind);
-            if (bind.size() / 16 < joint_count) {
-                refuse(ES_FILE_DAMAGED, "%s.inverseBindMatrices: has %zu matrices, there are %zu joints", skin_where.c_str(), bind.size() / 16, joint_count);
-            }
-        }
+        if (from.inverseBindMatrices >= 0) { read_floats(from.inverseBindMatrices, 16, skin_where + ".inverseBindMatrices", bind); }
         spend(joint_count, skin_where);
-        list<es_mat4> joints{counted<es_mat4>(context)};
+        list<es_node> joints{counted<es_node>(context)};
+        list<es_mat4> binds{counted<es_mat4>(context)};
         for (size_t j = 0; j < joint_count; j++) {
-            size_t node = index(from.joints[j], model.nodes.size(), skin_where + ".joints");
+            joints.push_back(node_of_joint(static_cast<size_t>(from.joints[j])));
             es_mat4 inverse = es_mat4_identity();
             if (!bind.empty()) { memcpy(inverse.m, &bind[16 * j], sizeof inverse.m); }
-            joints.push_back(es_mat4_mul(globals[node], inverse));
+            binds.push_back(inverse);
         }
-        list<float> sums{counted<float>(context)}; /* 16 matrix elements and the weights' sum per vertex */
-        sums.assign(vertex_count * 17, 0.0f);
-        list<float> weights{counted<float>(context)};
+        list<uint32_t> vertex_joints{counted<uint32_t>(context)};
+        list<float> vertex_weights{counted<float>(context)};
+        size_t sets = 0;
+        while (attribute(primitive, ("JOINTS_" + std::to_string(sets)).c_str()) >= 0) { sets++; }
+        vertex_joints.assign(vertex_count * sets * 4, 0);
+        vertex_weights.assign(vertex_count * sets * 4, 0.0f);
+        for (size_t set = 0; set < sets; set++) {
+            list<float> numbers{counted<float>(context)}, weights{counted<float>(context)};
+            read_influences(primitive, set, joint_count, skin_where, where, vertex_count, numbers, weights);
+            for (size_t k = 0; k < weights.size(); k++) {
+                size_t to = k / 4 * sets * 4 + set * 4 + k % 4;
+                vertex_weights[to] = weights[k];
+                vertex_joints[to] = weights[k] == 0 ? 0 : static_cast<uint32_t>(numbers[k]);
+            }
+        }
+        es_skin_desc desc{};
+        desc.name = from.name.c_str();
+        desc.mesh = mesh;
+        desc.node = carrier_of(skin_index);
+        desc.joint_count = static_cast<uint32_t>(joint_count);
+        desc.joints = joints.data();
+        desc.inverse_binds = binds.data();
+        desc.influences = static_cast<uint32_t>(sets * 4);
+        desc.vertex_joints = vertex_joints.data();
+        desc.vertex_weights = vertex_weights.data();
+        es_skin skin;
+        check(es_world_add_skin(world, &desc, &skin));
+    }
+
+    /* One set of joints and weights, four each per vertex; joints are whole numbers below joint_count where the weight is not zero. */
+    void read_influences(const tinygltf::Primitive& primitive, size_t set, size_t joint_count, const std::string& skin_where, const std::string& where,
+        size_t vertex_count, list<float>& numbers, list<float>& weights)
+    {
+        std::string joints_name = "JOINTS_" + std::to_string(set), weights_name = "WEIGHTS_" + std::to_string(set);
+        int joint_accessor = attribute(primitive, joints_name.c_str()), weight_accessor = attribute(primitive, weights_name.c_str());
+        std::string place = where + ".attributes." + joints_name;
+        if (joint_accessor < 0 || weight_accessor < 0) { refuse(ES_FILE_DAMAGED, "%s: a skinned primitive needs it and %s", place.c_str(), weights_name.c_str()); }
+        const elements& e = accessor(joint_accessor, place);
+        if (e.components != 4 || (e.type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && e.type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)) {
+            refuse(ES_FILE_DAMAGED, "%s: accessors[%d] must be VEC4 of type 5121 or 5123", place.c_str(), joint_accessor);
+        }
+        check_count(e.count, vertex_count, place);
+        read_floats(weight_accessor, 4, where + ".attributes." + weights_name, weights);
+        check_count(weights.size() / 4, vertex_count, where + ".attributes." + weights_name);
+        read_floats(joint_accessor, 4, place, numbers); /* integers below 2^16 are exact in float */
+        float unscaled = !e.normalized ? 1.0f : e.type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ? 255.0f : 65535.0f;
+        for (size_t k = 0; k < weights.size(); k++) {
+            numbers[k] = std::floor(numbers[k] * unscaled + 0.5f);
+            if (weights[k] == 0) { continue; }
+            if (numbers[k] >= static_cast<float>(joint_count) || !(weights[k] > 0 && weights[k] <= 1e6f)) {
+                refuse(ES_FILE_DAMAGED, "%s: vertex %zu has joint %.0f with weight %g; %s has %zu joints and weights must not be negative", place.c_str(), k / 4,
+                    static_cast<double>(numbers[k]), static_cast<double>(weights[k]), skin_where.c_str(), joint_count);
+            }
+        }
+    }
+
+    /* What of a skinned primitive does not depend on whether it has triangles. */
+    void check_skin(const tinygltf::Primitive& primitive, size_t skin_index, const std::string& where)
+    {
+        const tinygltf::Skin& from = model.skins[skin_index];
+        std::string skin_where = at("skins", skin_index);
+        if (from.joints.empty()) { refuse(ES_FILE_DAMAGED, "%s.joints: must name at least one node", skin_where.c_str()); }
+        if (from.joints.size() > ES_SKIN_JOINTS) { refuse(ES_FILE_UNSUPPORTED, "%s.joints: names %zu nodes, at most %d are read", skin_where.c_str(), from.joints.size(), ES_SKIN_JOINTS); }
+        for (int joint : from.joints) { index(joint, model.nodes.size(), skin_where + ".joints"); }
+        if (from.inverseBindMatrices >= 0) {
+            const elements& e = accessor(from.inverseBindMatrices, skin_where + ".inverseBindMatrices");
+            if (e.count < from.joints.size()) {
+                refuse(ES_FILE_DAMAGED, "%s.inverseBindMatrices: has %zu matrices, there are %zu joints", skin_where.c_str(), e.count, from.joints.size());
+            }
+        }
         for (size_t set = 0;; set++) {
             std::string joints_name = "JOINTS_" + std::to_string(set), weights_name = "WEIGHTS_" + std::to_string(set);
-            int joint_accessor = attribute(primitive, joints_name.c_str()), weight_accessor = attribute(primitive, weights_name.c_str());
-            if (joint_accessor < 0 && weight_accessor < 0 && set > 0) { break; }
-            std::string place = where + ".attributes." + joints_name;
-            if (joint_accessor < 0 || weight_accessor < 0) { refuse(ES_FILE_DAMAGED, "%s: a skinned primitive needs it and %s", place.c_str(), weights_name.c_str()); }
-            const elements& e = accessor(joint_accessor, place);
-            if (e.components != 4 || (e.type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE && e.type != TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT)) {
-                refuse(ES_FILE_DAMAGED, "%s: accessors[%d] must be VEC4 of type 5121 or 5123", place.c_str(), joint_accessor);
+            bool has_joints = attribute(primitive, joints_name.c_str()) >= 0, has_weights = attribute(primitive, weights_name.c_str()) >= 0;
+            if (!has_joints && !has_weights && set > 0) { break; }
+            if (!has_joints || !has_weights) {
+                refuse(ES_FILE_DAMAGED, "%s.attributes.%s: a skinned primitive needs it and %s", where.c_str(), joints_name.c_str(), weights_name.c_str());
             }
-            check_count(e.count, vertex_count, place);
-            read_floats(weight_accessor, 4, where + ".attributes." + weights_name, weights);
-            check_count(weights.size() / 4, vertex_count, where + ".attributes." + weights_name);
-            list<float> numbers{counted<float>(context)}; /* integers below 2^16 are exact in float */
-            read_floats(joint_accessor, 4, place, numbers);
-            float unscaled = !e.normalized ? 1.0f : e.type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ? 255.0f : 65535.0f;
-            for (size_t k = 0; k < weights.size(); k++) {
-                if (weights[k] == 0) { continue; }
-                size_t joint = static_cast<size_t>(numbers[k] * unscaled + 0.5f);
-                if (joint >= joint_count || weights[k] < 0) {
-                    refuse(ES_FILE_DAMAGED, "%s: vertex %zu has joint %zu with weight %g; %s has %zu joints and weights must not be negative", place.c_str(), k / 4, joint,
-                        static_cast<double>(weights[k]), skin_where.c_str(), joint_count);
-                }
-                float* sum = &sums[k / 4 * 17];
-                for (size_t c = 0; c < 16; c++) { sum[c] += weights[k] * joints[joint].m[c]; }
-                sum[16] += weights[k];
+            if (set >= ES_SKIN_INFLUENCES / 4) { refuse(ES_FILE_UNSUPPORTED, "%s.attributes.%s: at most %d sets are read", where.c_str(), joints_name.c_str(), ES_SKIN_INFLUENCES / 4); }
+        }
+    }
+
+    std::map<size_t, es_node> carriers; /* by skin */
+
+    /* The nearest node that is an ancestor of all joints; null: only the world is. */
+    es_node carrier_of(size_t skin_index)
+    {
+        auto known = carriers.find(skin_index);
+        if (known != carriers.end()) { return known->second; }
+        auto depth_of = [&](int node) {
+            size_t depth = 0;
+            for (; node >= 0; node = parents[static_cast<size_t>(node)]) { depth++; }
+            return depth;
+        };
+        const std::vector<int>& joints = model.skins[skin_index].joints;
+        int common = parents[static_cast<size_t>(joints[0])];
+        size_t common_depth = depth_of(common);
+        for (size_t j = 1; j < joints.size() && common >= 0; j++) {
+            int other = parents[static_cast<size_t>(joints[j])];
+            size_t depth = depth_of(other);
+            spend(depth, at("skins", skin_index));
+            for (; depth > common_depth; depth--) { other = parents[static_cast<size_t>(other)]; }
+            for (; common_depth > depth; common_depth--) { common = parents[static_cast<size_t>(common)]; }
+            for (; common != other; common_depth--) {
+                common = parents[static_cast<size_t>(common)];
+                other = parents[static_cast<size_t>(other)];
             }
         }
-        for (size_t v = 0; v < vertex_count; v++) {
-            const float* sum = &sums[v * 17];
-            if (!(sum[16] > 0)) { continue; } /* held by no joint: stays where it is */
-            es_mat4 matrix;
-            for (size_t c = 0; c < 16; c++) { matrix.m[c] = sum[c] / sum[16]; }
-            float* p = &g.positions[3 * v];
-            es_vec3 moved = es_mat4_point(&matrix, {p[0], p[1], p[2]});
-            p[0] = moved.x, p[1] = moved.y, p[2] = moved.z;
-            if (!g.normals.empty()) {
-                float n[9], *from_normal = &g.normals[3 * v];
-                es_mat4_normal_matrix(&matrix, n);
-                float x = from_normal[0], y = from_normal[1], z = from_normal[2];
-                es_vec3 turned = es_v3_normalize(
-                    {n[0] * x + n[3] * y + n[6] * z, n[1] * x + n[4] * y + n[7] * z, n[2] * x + n[5] * y + n[8] * z}, {x, y, z});
-                from_normal[0] = turned.x, from_normal[1] = turned.y, from_normal[2] = turned.z;
-            }
-            if (!g.tangents.empty()) {
-                float* t = &g.tangents[4 * v];
-                es_vec3 turned = es_v3_normalize(es_mat4_direction(&matrix, {t[0], t[1], t[2]}), {t[0], t[1], t[2]});
-                t[0] = turned.x, t[1] = turned.y, t[2] = turned.z;
-            }
+        es_node carrier = common < 0 ? es_node{0} : node_of_joint(static_cast<size_t>(common));
+        carriers[skin_index] = carrier;
+        return carrier;
+    }
+
+    void count_vertices(size_t vertex_count, const std::string& where)
+    {
+        vertex_total += vertex_count;
+        if (vertex_total > max_vertices) {
+            refuse(ES_FILE_UNSUPPORTED, "%s: with it the meshes and morph targets have %llu vertices, at most %llu are read", where.c_str(),
+                static_cast<unsigned long long>(vertex_total), static_cast<unsigned long long>(max_vertices));
         }
-        check_values(g.positions, 3, where + " in its skin's rest pose", attribute(primitive, "POSITION"));
     }
 
     /* Everything of a primitive as the file has it. */
@@ -1178,11 +1259,7 @@ class importer
     {
         int position = attribute(primitive, "POSITION");
         size_t vertex_count = accessor(position, where + ".attributes.POSITION").count;
-        vertex_total += vertex_count;
-        if (vertex_total > max_vertices) {
-            refuse(ES_FILE_UNSUPPORTED, "%s: with it the meshes have %llu vertices, at most %llu are read", where.c_str(),
-                static_cast<unsigned long long>(vertex_total), static_cast<unsigned long long>(max_vertices));
-        }
+        count_vertices(vertex_count, where);
         read_floats(position, 3, where + ".attributes.POSITION", g.positions);
         read_attribute(primitive, "NORMAL", 3, vertex_count, where, g.normals);
         /* without normals the tangents have nothing to be tangent to (§3.7.2.1) */
@@ -1220,8 +1297,10 @@ class importer
     }
 
     /* The world's mesh of a primitive; a null handle when it has no triangle. */
-    es_mesh mesh_of(const tinygltf::Node& node, size_t m, size_t p, bool skinned)
+    es_mesh mesh_of(size_t n, size_t m, size_t p)
     {
+        const tinygltf::Node& node = model.nodes[n];
+        bool skinned = node.skin >= 0;
         const tinygltf::Mesh& from = model.meshes[m];
         const tinygltf::Primitive& primitive = from.primitives[p];
         std::string where = primitive_path(m, p);
@@ -1230,7 +1309,8 @@ class importer
         for (size_t t = 0; t < weights.size() && t < given.size(); t++) { weights[t] = number(given[t], -1e6, 1e6, at("meshes", m) + ".weights"); }
 
         static const char* const names[] = {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
-        std::vector<int64_t> key{primitive.mode, primitive.indices};
+        bool weighted = !primitive.targets.empty() && weighted_nodes.count(n) > 0;
+        std::vector<int64_t> key{primitive.mode, primitive.indices, weighted ? static_cast<int64_t>(n) : -1};
         for (const char* name : names) { key.push_back(attribute(primitive, name)); }
         for (size_t t = 0; t < weights.size(); t++) {
             key.push_back(bits_of(weights[t]));
@@ -1246,8 +1326,9 @@ class importer
 
         geometry g(context);
         read_geometry(primitive, where, g);
-        if (!primitive.targets.empty()) { morph(primitive, weights, where, g); }
-        if (skinned) { skin(primitive, static_cast<size_t>(node.skin), where, g); }
+        if (primitive.targets.size() > ES_MORPH_TARGETS) { refuse(ES_FILE_UNSUPPORTED, "%s.targets: has %zu of them, at most %d are read", where.c_str(), primitive.targets.size(), ES_MORPH_TARGETS); }
+        read_targets(primitive, where, g);
+        if (skinned) { check_skin(primitive, static_cast<size_t>(node.skin), where); }
 
         es_mesh mesh{0};
         if (!g.indices.empty()) {
@@ -1263,7 +1344,16 @@ class importer
             desc.colors = g.colors.empty() ? nullptr : g.colors.data();
             desc.indices = g.indices.data();
             desc.flat_normals = g.normals.empty();
+            std::vector<es_morph_target> targets(primitive.targets.size());
+            for (size_t t = 0; t < targets.size(); t++) {
+                const float** streams[] = {&targets[t].positions, &targets[t].normals, &targets[t].tangents};
+                for (size_t k = 0; k < 3; k++) { *streams[k] = g.targets[3 * t + k].empty() ? nullptr : g.targets[3 * t + k].data(); }
+            }
+            desc.target_count = static_cast<uint32_t>(targets.size());
+            desc.targets = targets.data();
+            desc.weights = weights.data();
             check(es_world_add_mesh(world, &desc, &mesh));
+            if (skinned) { add_skin(primitive, static_cast<size_t>(node.skin), where, desc.vertex_count, mesh); }
         }
         if (!skinned) { meshes[key] = mesh; }
         return mesh;
@@ -1281,16 +1371,10 @@ class importer
             bool skinned = node.skin >= 0;
             es_node carrier = nodes[n];
             if (skinned) {
-                index(node.skin, model.skins.size(), at("nodes", n) + ".skin");
-                /* baked in world space, so it hangs on a node of its own with no transform */
-                es_node_desc desc{};
-                std::string name = node.name + " (skinned)";
-                desc.name = name.c_str();
-                desc.transform = es_identity_transform();
-                check(es_world_add_node(world, &desc, &carrier));
-                left.skins++;
+                size_t skin = index(node.skin, model.skins.size(), at("nodes", n) + ".skin");
+                for (int joint : model.skins[skin].joints) { index(joint, model.nodes.size(), at("skins", skin) + ".joints"); }
+                carrier = model.skins[skin].joints.empty() ? nodes[n] : carrier_of(skin);
             }
-            bool morphed = false;
             for (size_t p = 0; p < model.meshes[m].primitives.size(); p++) {
                 const tinygltf::Primitive& primitive = model.meshes[m].primitives[p];
                 if (!is_triangles(primitive, m, p)) {
@@ -1299,17 +1383,16 @@ class importer
                 }
                 if (attribute(primitive, "POSITION") < 0) { continue; } /* §3.7.2.1: such a primitive is not drawn */
                 if (primitive.material >= 0) { index(primitive.material, model.materials.size(), primitive_path(m, p) + ".material"); }
-                morphed |= !primitive.targets.empty();
                 es_instance_desc desc{};
                 desc.node = carrier;
-                desc.mesh = mesh_of(node, m, p, skinned);
+                desc.mesh = mesh_of(n, m, p);
                 if (desc.mesh.id == 0) { continue; }
+                if (!primitive.targets.empty()) { morphed_meshes[n].push_back(desc.mesh); }
                 desc.material = material_of(primitive.material);
                 es_instance instance;
                 check(es_world_add_instance(world, &desc, &instance));
                 instance_total++;
             }
-            left.morphs += morphed;
         }
         check_unused_meshes(used);
     }
@@ -1363,6 +1446,7 @@ class importer
         }
         es_light light;
         check(es_world_add_light(world, &desc, &light));
+        lights[i].push_back(light);
     }
 
     /* Directional, from above the left shoulder of a camera with these axes (right, up, back). */
@@ -1440,6 +1524,7 @@ class importer
         }
         es_camera camera;
         check(es_world_add_camera(world, &desc, &camera));
+        cameras[i].push_back(camera);
     }
 
     /* Looks at the middle of everything from a little to the right and above, far enough for its bounding sphere. */
@@ -1472,9 +1557,144 @@ class importer
 
     /* ---- §3.11: animations -------------------------------------------------------------------------------------------------------------------- */
 
+    /* What an animation's channel moves: a node's own path, or a KHR_animation_pointer. */
+    enum class moved { nothing, node, light, camera };
+    struct channel_target {
+        moved kind = moved::nothing;
+        size_t number = 0;
+        es_clip_path path = ES_CLIP_TRANSLATION;
+        bool operator<(const channel_target& other) const
+        {
+            return std::make_tuple(kind, number, path) < std::make_tuple(other.kind, other.number, other.path);
+        }
+    };
+
+    static bool node_path(const std::string& name, es_clip_path& path)
+    {
+        static const struct { const char* name; es_clip_path path; } paths[] = {{"translation", ES_CLIP_TRANSLATION}, {"rotation", ES_CLIP_ROTATION},
+            {"scale", ES_CLIP_SCALE}, {"weights", ES_CLIP_WEIGHTS}};
+        for (const auto& each : paths) {
+            if (name == each.name) {
+                path = each.path;
+                return true;
+            }
+        }
+        return false;
+    }
+
+    /* A whole number and what follows its slash; false when `text` does not begin so. */
+    static bool take_number(std::string& text, size_t& number)
+    {
+        size_t digits = 0;
+        number = 0;
+        while (digits < text.size() && digits < 9 && text[digits] >= '0' && text[digits] <= '9') { number = number * 10 + static_cast<size_t>(text[digits++] - '0'); }
+        if (digits == 0 || digits == text.size() || text[digits] != '/') { return false; }
+        text.erase(0, digits + 1);
+        return true;
+    }
+
+    /* KHR_animation_pointer: where in the file the value lies that is animated. */
+    channel_target target_of_pointer(std::string text, const std::string& where)
+    {
+        static const struct { moved kind; const char* begin; const char* end; es_clip_path path; } pointers[] = {
+            {moved::node, "/nodes/", "translation", ES_CLIP_TRANSLATION},
+            {moved::node, "/nodes/", "rotation", ES_CLIP_ROTATION},
+            {moved::node, "/nodes/", "scale", ES_CLIP_SCALE},
+            {moved::node, "/nodes/", "weights", ES_CLIP_WEIGHTS},
+            {moved::light, "/extensions/KHR_lights_punctual/lights/", "color", ES_CLIP_LIGHT_COLOR},
+            {moved::light, "/extensions/KHR_lights_punctual/lights/", "intensity", ES_CLIP_LIGHT_INTENSITY},
+            {moved::light, "/extensions/KHR_lights_punctual/lights/", "spot/innerConeAngle", ES_CLIP_LIGHT_INNER_CONE},
+            {moved::light, "/extensions/KHR_lights_punctual/lights/", "spot/outerConeAngle", ES_CLIP_LIGHT_OUTER_CONE},
+            {moved::light, "/extensions/KHR_lights_punctual/lights/", "range", ES_CLIP_LIGHT_RANGE},
+            {moved::camera, "/cameras/", "perspective/yfov", ES_CLIP_CAMERA_FOV},
+            {moved::camera, "/cameras/", "orthographic/ymag", ES_CLIP_CAMERA_HALF_HEIGHT},
+            {moved::camera, "/cameras/", "perspective/znear", ES_CLIP_CAMERA_NEAR},
+            {moved::camera, "/cameras/", "orthographic/znear", ES_CLIP_CAMERA_NEAR},
+        };
+        channel_target target;
+        for (const auto& each : pointers) {
+            std::string rest = text;
+            if (rest.compare(0, strlen(each.begin), each.begin) != 0) { continue; }
+            rest.erase(0, strlen(each.begin));
+            if (!take_number(rest, target.number)) { refuse(ES_FILE_DAMAGED, "%s: '%s' names no object by its number", where.c_str(), shown(text).c_str()); }
+            if (rest != each.end) { continue; }
+            target.kind = each.kind;
+            target.path = each.path;
+            size_t count = each.kind == moved::node ? model.nodes.size() : each.kind == moved::light ? model.lights.size() : model.cameras.size();
+            index(static_cast<int>(target.number), count, where);
+            return target;
+        }
+        if (text.empty() || text[0] != '/') { refuse(ES_FILE_DAMAGED, "%s: is '%s', must begin with a slash", where.c_str(), shown(text).c_str()); }
+        if (left.dropped_pointers++ == 0) { left.pointer_name = shown(text); }
+        return channel_target{};
+    }
+
+    channel_target target_of(const tinygltf::AnimationChannel& channel, const std::string& where)
+    {
+        channel_target target;
+        if (channel.target_path == "pointer") {
+            const tinygltf::Value* use = extension(channel.target_extensions, "KHR_animation_pointer");
+            const tinygltf::Value* pointer = use ? member(*use, "pointer") : nullptr;
+            std::string place = where + ".target.extensions.KHR_animation_pointer.pointer";
+            if (!pointer || !pointer->IsString()) { refuse(ES_FILE_DAMAGED, "%s: is absent or no string", place.c_str()); }
+            return target_of_pointer(pointer->Get<std::string>(), place);
+        }
+        if (channel.target_node < 0) { return target; }
+        target.number = index(channel.target_node, model.nodes.size(), where + ".target.node");
+        if (node_path(channel.target_path, target.path)) {
+            target.kind = moved::node;
+        } else {
+            left.dropped_channels++; /* things of extensions */
+        }
+        return target;
+    }
+
+    void find_weighted_nodes()
+    {
+        left_out before = left;
+        for (size_t a = 0; a < model.animations.size(); a++) {
+            for (size_t c = 0; c < model.animations[a].channels.size(); c++) {
+                channel_target target = target_of(model.animations[a].channels[c], at("animations", a) + ".channels[" + std::to_string(c) + "]");
+                if (target.kind == moved::node && target.path == ES_CLIP_WEIGHTS) { weighted_nodes.insert(target.number); }
+            }
+        }
+        left = before;
+    }
+
     void add_clips()
     {
         for (size_t a = 0; a < model.animations.size(); a++) { add_clip(a); }
+    }
+
+    /* The world's objects that a channel moves, one channel each: a light or camera may hang on several nodes, a mesh have several primitives. */
+    std::vector<es_clip_channel> channels_of(const channel_target& target)
+    {
+        std::vector<es_clip_channel> out;
+        es_clip_channel channel{};
+        channel.path = target.path;
+        if (target.kind == moved::light) {
+            for (es_light light : lights[target.number]) {
+                channel.light = light;
+                es_light_desc desc;
+                check(es_world_get_light(world, light, &desc));
+                if (target.path == ES_CLIP_LIGHT_RANGE && desc.type == ES_LIGHT_DIRECTIONAL) { continue; }
+                out.push_back(channel);
+            }
+        } else if (target.kind == moved::camera) {
+            for (es_camera camera : cameras[target.number]) {
+                channel.camera = camera;
+                out.push_back(channel);
+            }
+        } else if (target.path == ES_CLIP_WEIGHTS) {
+            for (es_mesh mesh : morphed_meshes[target.number]) {
+                channel.mesh = mesh;
+                out.push_back(channel);
+            }
+        } else if (nodes[target.number].id != 0) {
+            channel.node = nodes[target.number];
+            out.push_back(channel);
+        }
+        return out;
     }
 
     void add_clip(size_t a)
@@ -1482,33 +1702,23 @@ class importer
         const tinygltf::Animation& from = model.animations[a];
         std::map<int, list<float>> data; /* of accessors, by number */
         std::vector<es_clip_channel> channels;
-        std::set<std::pair<size_t, es_clip_path>> targets;
+        std::set<channel_target> targets;
         for (size_t c = 0; c < from.channels.size(); c++) {
             const tinygltf::AnimationChannel& channel = from.channels[c];
             std::string where = at("animations", a) + ".channels[" + std::to_string(c) + "]";
-            if (channel.target_node < 0) { continue; }
-            size_t node = index(channel.target_node, model.nodes.size(), where + ".target.node");
+            channel_target target = target_of(channel, where);
+            if (target.kind == moved::nothing) { continue; }
             const tinygltf::AnimationSampler& sampler = from.samplers[index(channel.sampler, from.samplers.size(), where + ".sampler")];
-            if (channel.target_path == "weights") {
-                left.weights++;
+            std::vector<es_clip_channel> moving = channels_of(target);
+            if (moving.empty()) { /* of another scene, or of a mesh without targets */
+                left.weightless += target.path == ES_CLIP_WEIGHTS;
                 continue;
             }
-            es_clip_channel out{};
-            if (channel.target_path == "translation") {
-                out.path = ES_CLIP_TRANSLATION;
-            } else if (channel.target_path == "rotation") {
-                out.path = ES_CLIP_ROTATION;
-            } else if (channel.target_path == "scale") {
-                out.path = ES_CLIP_SCALE;
-            } else {
-                left.dropped_channels++; /* "pointer" and other things of extensions */
-                continue;
-            }
-            if (nodes[node].id == 0) { continue; } /* of another scene */
-            if (!targets.emplace(node, out.path).second) {
-                refuse(ES_FILE_DAMAGED, "%s.target: another channel of the animation has the same node and path", where.c_str());
+            if (!targets.insert(target).second) {
+                refuse(ES_FILE_DAMAGED, "%s.target: another channel of the animation has the same target", where.c_str());
             }
             std::string sampler_where = at("animations", a) + ".samplers[" + std::to_string(channel.sampler) + "]";
+            es_clip_channel out{};
             if (sampler.interpolation == "STEP") {
                 out.interpolation = ES_INTERPOLATE_STEP;
             } else if (sampler.interpolation == "CUBICSPLINE") {
@@ -1519,10 +1729,16 @@ class importer
                 refuse(ES_FILE_DAMAGED, "%s.interpolation: is '%s', must be LINEAR, STEP or CUBICSPLINE", sampler_where.c_str(),
                     shown(sampler.interpolation).c_str());
             }
-            int components = out.path == ES_CLIP_ROTATION ? 4 : 3;
+            size_t components = 0; /* numbers per key: of the node's first primitive, which all must have */
+            for (const es_clip_channel& each : moving) {
+                size_t own = es_clip_components(world, &each);
+                if (components != 0 && own != components) { refuse(ES_FILE_DAMAGED, "%s.target: the node's primitives have %zu and %zu morph targets, they must be equal", where.c_str(), components, own); }
+                components = own;
+            }
+            int per_element = target.path == ES_CLIP_WEIGHTS ? 1 : static_cast<int>(components);
             const list<float>& times = animation_data(data, sampler.input, 1, sampler_where + ".input");
-            const list<float>& values = animation_data(data, sampler.output, components, sampler_where + ".output");
-            size_t per_key = static_cast<size_t>(components) * (out.interpolation == ES_INTERPOLATE_CUBIC_SPLINE ? 3 : 1);
+            const list<float>& values = animation_data(data, sampler.output, per_element, sampler_where + ".output");
+            size_t per_key = components * (out.interpolation == ES_INTERPOLATE_CUBIC_SPLINE ? 3 : 1);
             if (times.size() * per_key != values.size()) {
                 refuse(ES_FILE_DAMAGED, "%s.output: has %zu numbers, %zu keys need %zu", sampler_where.c_str(), values.size(), times.size(),
                     times.size() * per_key);
@@ -1534,11 +1750,13 @@ class importer
                         sampler.input, static_cast<double>(times[k]));
                 }
             }
-            out.node = nodes[node];
-            out.key_count = static_cast<uint32_t>(times.size());
-            out.times = times.data();
-            out.values = values.data();
-            channels.push_back(out);
+            for (es_clip_channel& each : moving) {
+                each.interpolation = out.interpolation;
+                each.key_count = static_cast<uint32_t>(times.size());
+                each.times = times.data();
+                each.values = values.data();
+                channels.push_back(each);
+            }
         }
         /* an animation without a channel that can be played still has its number */
         es_clip_desc desc{from.name.c_str(), static_cast<uint32_t>(channels.size()), channels.data()};
@@ -1565,10 +1783,11 @@ class importer
     {
         if (left.lines_and_points) { warn("%zu primitives of points or lines are left out, only triangles are drawn", left.lines_and_points); }
         if (left.partial_triangles) { warn("%zu primitives end in an incomplete triangle, which is left out", left.partial_triangles); }
-        if (left.skins) { warn("%zu skinned meshes are shown in their rest pose, they do not move", left.skins); }
-        if (left.morphs) { warn("%zu meshes with morph targets are shown with their default weights, they do not move", left.morphs); }
-        if (left.weights) { warn("%zu animation channels of morph weights are left out", left.weights); }
-        if (left.dropped_channels) { warn("%zu animation channels with a path other than translation, rotation, scale are left out", left.dropped_channels); }
+        if (left.dropped_channels) { warn("%zu animation channels with a path other than translation, rotation, scale, weights are left out", left.dropped_channels); }
+        if (left.weightless) { warn("%zu animation channels of morph weights are left out, no mesh of the scene has such targets", left.weightless); }
+        if (left.dropped_pointers) {
+            warn("%zu animated properties are none of those that are animated here, they are left out (the first: %s)", left.dropped_pointers, left.pointer_name.c_str());
+        }
         if (left.blended) {
             warn("%zu blended materials are drawn as masked, where alpha is at least 0.5 (the first: %s)", left.blended, left.blended_name.c_str());
         }

@@ -92,6 +92,8 @@ es_result es_world_destroy_light(es_world* world, es_light light)
     if (!world) return ES_INVALID_ARGUMENT;
     es_light_object* object = light_object(world, light);
     if (!object) return ES_STALE_HANDLE;
+    if (object->object.references)
+        return es_misuse(world->context, ES_WRONG_STATE, "light '%.64s' cannot be destroyed: %u things move it", object->object.name ? object->object.name : "", object->object.references);
     es_world_rereference(world, ES_OBJECT_NODE, object->desc.node.id, 0);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_LIGHT], &object->object);
     world->lights_dirty = true;

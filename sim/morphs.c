@@ -1,5 +1,5 @@
 /* Morph targets: displacements of a mesh's streams and the weights they are taken with. */
-#include "sim/world.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -135,6 +135,7 @@ es_result es_world_set_morph_weights(es_world* world, es_mesh mesh, const float*
     if (!count || memcmp(object->drive->weights, weights, count * sizeof *weights) == 0) return ES_OK;
     memcpy(object->drive->weights, weights, count * sizeof *weights);
     world->poses_dirty = true;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_MORPH_WEIGHTS, .id = mesh.id, .state = {weights, count * sizeof *weights}});
     return ES_OK;
 }
 

@@ -138,6 +138,15 @@ static void visit_input(state_io* io, es_input* in)
     case ES_INPUT_LIGHT: visit_light(io, &in->light); break;
     case ES_INPUT_MOVER: visit_mover(io, &in->mover); break;
     case ES_INPUT_CLIP: visit_flag(io, &in->flag); break;
+    case ES_INPUT_PLAY_CLIP:
+        visit_floats(io, &in->clip.weight, 1);
+        visit_floats(io, &in->clip.speed, 1);
+        visit_floats(io, &in->clip.start, 1);
+        visit_floats(io, &in->clip.fade, 1);
+        visit_flag(io, &in->clip.once);
+        break;
+    case ES_INPUT_STOP_CLIP: visit_floats(io, &in->number, 1); break;
+    case ES_INPUT_MORPH_WEIGHTS: visit_state(io, in); break;
     case ES_INPUT_INSTANCE:
         visit_u32(io, &in->instance.node.id);
         visit_u32(io, &in->instance.mesh.id);
@@ -202,6 +211,17 @@ es_recording* es_recording_pause(es_world* world)
     return recording;
 }
 
+/* The noted bytes may lie anywhere. */
+static es_result apply_weights(es_world* world, const es_input* in)
+{
+    float* weights = es_allocate(world->context, in->state.size);
+    if (!weights) return es_context_last_result(world->context);
+    memcpy(weights, in->state.bytes, in->state.size);
+    es_result result = es_world_set_morph_weights(world, (es_mesh){in->id}, weights, (uint32_t)(in->state.size / sizeof *weights));
+    es_release(world->context, weights, in->state.size);
+    return result;
+}
+
 static es_result apply(es_world* world, const es_input* in)
 {
     const double* place = in->flag ? in->place : NULL;
@@ -221,6 +241,9 @@ static es_result apply(es_world* world, const es_input* in)
     case ES_INPUT_LIGHT: return es_world_set_light(world, (es_light){in->id}, &in->light);
     case ES_INPUT_MOVER: return es_world_set_mover(world, (es_mover){in->id}, &in->mover);
     case ES_INPUT_CLIP: return es_world_play_clip(world, (es_clip){in->id}, in->flag);
+    case ES_INPUT_PLAY_CLIP: return es_world_play_clip_with(world, (es_clip){in->id}, &in->clip);
+    case ES_INPUT_STOP_CLIP: return es_world_stop_clip(world, (es_clip){in->id}, in->number);
+    case ES_INPUT_MORPH_WEIGHTS: return apply_weights(world, in);
     case ES_INPUT_INSTANCE: return es_world_set_instance(world, (es_instance){in->id}, &in->instance);
     case ES_INPUT_BODY_POSE: return es_world_set_body_pose(world, (es_body){in->id}, in->place, in->rotation);
     case ES_INPUT_BODY_VELOCITY: return es_world_set_body_velocity(world, (es_body){in->id}, in->a, in->b);

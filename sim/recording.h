@@ -15,6 +15,9 @@ typedef enum es_input_type {
     ES_INPUT_LIGHT,
     ES_INPUT_MOVER,
     ES_INPUT_CLIP,
+    ES_INPUT_PLAY_CLIP,
+    ES_INPUT_STOP_CLIP,       /* number: the fade */
+    ES_INPUT_MORPH_WEIGHTS,   /* state: the weights */
     ES_INPUT_INSTANCE,
     ES_INPUT_BODY_POSE,
     ES_INPUT_BODY_VELOCITY,
@@ -41,6 +44,7 @@ typedef struct es_input {
         es_camera_desc camera;
         es_light_desc light;
         es_mover_desc mover;
+        es_clip_play clip;
         es_instance_desc instance;
         es_joint_desc joint;
         es_world_settings settings;

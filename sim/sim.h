@@ -240,7 +240,13 @@ ES_API bool es_world_get_environment(const es_world* world, es_environment_desc*
 
 /* ---- clips ------------------------------------------------------------------------------------------------------------------------------------ */
 
-typedef enum es_clip_path { ES_CLIP_TRANSLATION, ES_CLIP_ROTATION, ES_CLIP_SCALE } es_clip_path;
+typedef enum es_clip_path {
+    ES_CLIP_TRANSLATION, ES_CLIP_ROTATION, ES_CLIP_SCALE, /* of `node`: 3, 4, 3 numbers per key */
+    ES_CLIP_WEIGHTS,                                      /* of the morph targets of `mesh`: as many as it has */
+    ES_CLIP_LIGHT_COLOR, ES_CLIP_LIGHT_INTENSITY, ES_CLIP_LIGHT_INNER_CONE, ES_CLIP_LIGHT_OUTER_CONE, ES_CLIP_LIGHT_RANGE, /* of `light`: 3, then 1 each, as in es_light_desc */
+    ES_CLIP_CAMERA_FOV, ES_CLIP_CAMERA_HALF_HEIGHT, ES_CLIP_CAMERA_NEAR, /* of `camera`: 1 each, as in es_camera_desc */
+    ES_CLIP_PATHS
+} es_clip_path;
 typedef enum es_interpolation { ES_INTERPOLATE_STEP, ES_INTERPOLATE_LINEAR, ES_INTERPOLATE_CUBIC_SPLINE } es_interpolation;
 typedef struct es_clip_channel {
     es_node node;
@@ -248,12 +254,43 @@ typedef struct es_clip_channel {
     es_interpolation interpolation;
     uint32_t key_count;
     const float* times;       /* seconds, strictly increasing */
-    const float* values;      /* 3 or 4 per key; cubic spline: in-tangent, value, out-tangent per key */
+    const float* values;      /* so many per key as the path has; cubic spline: in-tangents, values, out-tangents per key */
+    es_mesh mesh;             /* what moves, where the path is none of a node's */
+    es_light light;
+    es_camera camera;
 } es_clip_channel;
 typedef struct es_clip_desc { const char* name; uint32_t channel_count; const es_clip_channel* channels; } es_clip_desc;
-/* Copied, and not played before es_world_play_clip says so (opening a scene or file does, by the settings). Clips loop over their duration. */
+/* Copied, and not played before es_world_play_clip says so (opening a scene or file does, by the settings). Cones, ranges and the like that
+ * leave what their setters accept are taken to the nearest that is accepted. */
 ES_API es_result es_world_add_clip(es_world* world, const es_clip_desc* desc, es_clip* clip);
+/* From the beginning, in a loop over its duration (the last key of all channels), at full weight; nothing happens to one that plays. false:
+ * it stops at once and what it moved stays where it is. */
 ES_API es_result es_world_play_clip(es_world* world, es_clip clip, bool play);
+
+/* Clips that move the same thing are averaged by their weights. Where these sum to less than one, the rest is what the thing was before the
+ * first clip for it was added (morph weights: those of the mesh's desc). To cross-fade, stop one and start the other with the same fade:
+ * a clip alone at weight one, before and after, is taken exactly. */
+typedef struct es_clip_play {
+    float weight;             /* 0 … 1000; 0: it ends when it has faded */
+    float speed;              /* -100 … 100 */
+    float start;              /* seconds into the clip; negative: goes on from where it is, or begins at its beginning (its end, when speed is negative) */
+    bool once;                /* stays at the end (or beginning) it reaches; else it loops */
+    float fade;               /* seconds over which the weight goes, in a straight line, from what it is now to `weight`; 0: at once */
+} es_clip_play;
+ES_API es_clip_play es_default_clip_play(void); /* weight 1, speed 1, start -1, looping, no fade */
+/* how NULL: the default. */
+ES_API es_result es_world_play_clip_with(es_world* world, es_clip clip, const es_clip_play* how);
+/* Fades it out; then it ends, and what it alone moved is as it was before clips. */
+ES_API es_result es_world_stop_clip(es_world* world, es_clip clip, float fade);
+typedef struct es_clip_state {
+    bool playing, once;
+    float weight, target_weight; /* now, and at the end of the fade; 0 when it does not play */
+    float speed;
+    double time;              /* seconds into the clip */
+    float duration;
+    uint32_t channel_count;
+} es_clip_state;
+ES_API es_result es_world_get_clip(const es_world* world, es_clip clip, es_clip_state* state);
 
 /* ---- shapes of bodies --------------------------------------------------------------------------------------------------------------------------- */
 

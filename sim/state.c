@@ -179,14 +179,21 @@ static void visit_mesh(es_world* world, state_io* io, es_mesh_object* mesh)
 static void visit_clip(state_io* io, es_clip_object* clip)
 {
     bool playing = clip->playing;
-    double start = clip->start;
+    es_clip_playing play = clip->play;
     visit_flag(io, &playing);
-    transfer(io, &start, sizeof start);
+    transfer(io, &play.start, sizeof play.start);
+    transfer(io, &play.offset, sizeof play.offset);
+    transfer(io, &play.fade_start, sizeof play.fade_start);
+    visit_floats(io, &play.speed, 1);
+    visit_floats(io, &play.from, 1);
+    visit_floats(io, &play.to, 1);
+    visit_floats(io, &play.fade, 1);
+    visit_flag(io, &play.once);
     if (!reading(io) || !io->good) return;
-    io->good = start >= -1e12 && start <= 1e12;
+    io->good = es_clip_playing_valid(&play);
     if (io->mode != APPLY) return;
     clip->playing = playing;
-    clip->start = start;
+    clip->play = play;
 }
 
 static void visit_mover(es_world* world, state_io* io, es_mover_object* mover)

@@ -202,15 +202,12 @@ static void choose_clips(es_world* world)
         if (!clip) continue;
         number++;
         clip->playing = world->settings.clip == 0 || world->settings.clip == number;
-        clip->start = world->time;
-        for (uint32_t i = 0; i < clip->channel_count && world->settings.clip == 0; i++) {
-            const es_node_object* node = es_slots_get(&world->slots[ES_OBJECT_NODE], clip->channels[i].node.id);
-            if (node->played_by && node->played_by != clip->object.id) clip->playing = false;
+        clip->play.start = clip->play.fade_start = world->time;
+        for (uint32_t i = 0; i < clip->track_count && world->settings.clip == 0; i++) {
+            uint32_t played_by = *es_clip_played_by(world, &clip->tracks[i].channel);
+            if (played_by && played_by != clip->object.id) clip->playing = false;
         }
-        for (uint32_t i = 0; i < clip->channel_count && clip->playing; i++) {
-            es_node_object* node = es_slots_get(&world->slots[ES_OBJECT_NODE], clip->channels[i].node.id);
-            node->played_by = clip->object.id;
-        }
+        for (uint32_t i = 0; i < clip->track_count && clip->playing; i++) *es_clip_played_by(world, &clip->tracks[i].channel) = clip->object.id;
     }
 }
 

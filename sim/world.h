@@ -19,6 +19,14 @@ extern "C" {
 /* |weight of a morph target| at most */
 #define ES_MORPH_WEIGHT 1e6f
 
+/* What playing clips add up to for one value of up to four numbers, see sim/clip_targets.c. */
+typedef struct es_clip_sum { float value[4], share; bool touched; } es_clip_sum;
+typedef struct es_clip_sums {
+    es_clip_sum sums[ES_CLIP_LIGHT_RANGE - ES_CLIP_LIGHT_COLOR + 1]; /* by path, from the first that the kind of object has */
+    uint32_t played_by;      /* the clip that took the object when the world was opened */
+    bool kept;               /* `rest` is what the object was before the first clip for it was added */
+} es_clip_sums;
+
 typedef struct es_texture_object { es_object object; es_texture_image image; } es_texture_object;
 
 typedef struct es_material_object { es_object object; es_material_desc desc; } es_material_object;
@@ -56,7 +64,8 @@ typedef struct es_node_object {
     es_mat4 local, world, previous;
     double position[3], previous_position[3]; /* translations of `world` and `previous` before they are rounded */
     uint32_t depth;          /* of the root's children: 0 */
-    uint32_t played_by;      /* the clip that took the node when the world was opened */
+    es_transform rest;       /* what clips that weigh less than one leave something of */
+    es_clip_sums clip_sums;
     bool dirty;              /* `transform` changed since the last refresh */
     bool fresh;              /* created since then: has no last frame */
     bool changed;            /* `world` changed in this refresh */
@@ -68,6 +77,8 @@ typedef struct es_camera_object {
     es_object object;
     es_camera_desc desc;     /* name NULL */
     es_camera_desc previous;
+    es_camera_desc rest;
+    es_clip_sums clip_sums;
     es_mat4 previous_world;
     double previous_position[3];
     bool fresh;
@@ -75,21 +86,32 @@ typedef struct es_camera_object {
 
 typedef struct es_light_object {
     es_object object;
-    es_light_desc desc;
+    es_light_desc desc, rest;
+    es_clip_sums clip_sums;
     float dimmed;            /* share of the intensity that a flicker takes away now */
 } es_light_object;
 
 typedef struct es_mover_object { es_object object; es_mover_desc desc; } es_mover_object; /* name NULL */
 
+typedef struct es_clip_track { es_clip_channel channel; uint32_t components; } es_clip_track;
+
+/* How a clip plays; its weight goes from `from` to `to` while it fades. */
+typedef struct es_clip_playing {
+    double start, offset;    /* world time at which it stood at `offset` seconds */
+    double fade_start;
+    float speed, from, to, fade;
+    bool once;
+} es_clip_playing;
+
 typedef struct es_clip_object {
     es_object object;
-    es_clip_channel* channels;
-    uint32_t channel_count;
+    es_clip_track* tracks;
+    uint32_t track_count;
     float* data;             /* the channels' times and values, one after another */
     size_t data_count;
     float duration;
     bool playing;
-    double start;            /* world time at which it began to play */
+    es_clip_playing play;
 } es_clip_object;
 
 /* What a camera revision stands for. No padding: compared as bytes. */
@@ -186,6 +208,23 @@ void es_clips_play(es_world* world, double time);
 /* The same for movers; refreshes the nodes when one aims. */
 void es_movers_play(es_world* world, double time);
 bool es_mover_numbers_valid(const es_mover_desc* desc);
+/* Ends those that have faded out. */
+void es_clips_retire(es_world* world);
+bool es_clip_playing_valid(const es_clip_playing* playing);
+
+/* Two keys and the place between them. */
+typedef struct es_clip_segment { size_t key; bool hold; float u, length; } es_clip_segment;
+es_clip_segment es_clip_find(const es_clip_track* track, double time);
+/* Components [first, first + count) of the track's value; a rotation has all four at once. */
+void es_clip_value(const es_clip_track* track, const es_clip_segment* segment, uint32_t first, uint32_t count, float* value);
+/* sim/clip_targets.c: false after a message */
+bool es_clip_target_exists(es_world* world, const es_clip_channel* channel);
+uint32_t es_clip_components(const es_world* world, const es_clip_channel* channel);
+void es_clip_hold_target(es_world* world, const es_clip_channel* channel, bool hold);
+uint32_t* es_clip_played_by(es_world* world, const es_clip_channel* channel);
+void es_clip_add_value(es_world* world, const es_clip_track* track, double time, float weight);
+/* Sets the channel's target to what was added up for it. */
+void es_clip_apply(es_world* world, const es_clip_channel* channel);
 bool es_mesh_make_deformable(es_world* world, es_mesh_object* mesh);
 void es_mesh_restored(es_world* world, es_mesh_object* mesh);  /* after its streams were replaced */
 /* Room for `extra` more vertices, copies of the first one. False after es_fail. */
