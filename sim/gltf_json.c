@@ -17,8 +17,8 @@
  * some 50 KiB of stack. */
 enum { MAX_DEPTH = 128 };
 
-const char* const es_gltf_extensions[] = {"KHR_animation_pointer", "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular",
-    "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform", NULL};
+const char* const es_gltf_extensions[] = {"KHR_animation_pointer", "KHR_implicit_shapes", "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular",
+    "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_physics_rigid_bodies", "KHR_texture_transform", NULL};
 
 typedef struct span { const char* begin; size_t size; } span;
 
@@ -528,7 +528,11 @@ static bool parse(parser* p)
                 if (p->depth == 6) { p->target_names_node = false; }
                 p->at++;
                 skip_space(p);
-                if (p->at < p->end && *p->at == (c == '{' ? '}' : ']')) { continue; }
+                if (p->at < p->end && *p->at == (c == '{' ? '}' : ']')) {
+                    /* tinygltf drops empty objects of extensions and extras; "motion": {} has a meaning */
+                    if (c == '{' && p->ignored && (!emit_up_to(p, p->at) || !emit(p, "\"\":0", 4))) { return false; }
+                    continue;
+                }
                 if (c == '{' && !read_key(p)) { return false; }
                 state = BEFORE_VALUE;
                 continue;

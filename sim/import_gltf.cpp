@@ -25,6 +25,7 @@ extern "C" {
 #include "platform/maths.h"
 }
 #include "sim/gltf_file.h"
+#include "sim/gltf_physics.h"
 #include "sim/world.h"
 
 namespace
@@ -59,6 +60,55 @@ template <class T> struct counted {
     template <class U> bool operator!=(const counted<U>& other) const { return context != other.context; }
 };
 template <class T> using list = std::vector<T, counted<T>>;
+
+/* ---- values of extensions and extras, for sim/gltf_physics.c --------------------------------------------------------------- */
+
+const tinygltf::Value* value_at(const void* value) { return static_cast<const tinygltf::Value*>(value); }
+
+/* Not Value::Get(name): that one keeps a static object for what is absent. */
+const void* value_member(const void* object, const char* name)
+{
+    if (!object || !value_at(object)->IsObject()) { return nullptr; }
+    const tinygltf::Value::Object& members = value_at(object)->Get<tinygltf::Value::Object>();
+    auto found = members.find(name);
+    return found == members.end() ? nullptr : &found->second;
+}
+
+const void* value_element(const void* array, size_t i)
+{
+    const tinygltf::Value::Array& elements = value_at(array)->Get<tinygltf::Value::Array>();
+    return i < elements.size() ? &elements[i] : nullptr;
+}
+
+bool value_is_object(const void* value) { return value && value_at(value)->IsObject(); }
+
+bool value_array_length(const void* value, size_t* length)
+{
+    if (!value || !value_at(value)->IsArray()) { return false; }
+    *length = value_at(value)->ArrayLen();
+    return true;
+}
+
+bool value_number(const void* value, double* number)
+{
+    if (!value || !value_at(value)->IsNumber()) { return false; }
+    *number = value_at(value)->GetNumberAsDouble();
+    return true;
+}
+
+bool value_boolean(const void* value, bool* boolean)
+{
+    if (!value || !value_at(value)->IsBool()) { return false; }
+    *boolean = value_at(value)->Get<bool>();
+    return true;
+}
+
+const char* value_string(const void* value)
+{
+    return value && value_at(value)->IsString() ? value_at(value)->Get<std::string>().c_str() : nullptr;
+}
+
+const es_gltf_values gltf_values = {value_member, value_element, value_is_object, value_array_length, value_number, value_boolean, value_string};
 
 /* The caller's floating-point environment comes back on every way out. */
 struct fp_scope {
@@ -194,6 +244,7 @@ class importer
         add_lights();
         add_cameras();
         add_clips();
+        add_physics();
         warn_of_left_out();
         check(es_world_finish_opening(world));
         es_world* finished = world;
@@ -226,7 +277,7 @@ class importer
     std::map<std::pair<int, bool>, es_texture> textures; /* by image and sRGB */
     std::map<std::vector<int64_t>, es_mesh> meshes;      /* by everything a primitive's vertices come from */
     std::set<size_t> weighted_nodes;        /* whose morph weights an animation moves: their meshes are shared with no other node */
-    std::map<size_t, std::vector<es_mesh>> morphed_meshes;   /* by node */
+    std::map<size_t, std::vector<es_mesh>> node_meshes, morphed_meshes; /* by node */
     std::map<size_t, std::vector<es_light>> lights;          /* by number in the file */
     std::map<size_t, std::vector<es_camera>> cameras;
     uint64_t vertex_total = 0, elements_read = 0;
@@ -836,14 +887,7 @@ class importer
         return found != extensions.end() && found->second.IsObject() ? &found->second : nullptr;
     }
 
-    /* Not Value::Get(name): that one keeps a static object for what is absent. */
-    static const tinygltf::Value* member(const tinygltf::Value& object, const char* name)
-    {
-        if (!object.IsObject()) { return nullptr; }
-        const tinygltf::Value::Object& members = object.Get<tinygltf::Value::Object>();
-        auto found = members.find(name);
-        return found == members.end() ? nullptr : &found->second;
-    }
+    static const tinygltf::Value* member(const tinygltf::Value& object, const char* name) { return value_at(value_member(&object, name)); }
 
     /* A number of an extension; `standard` when it is absent. */
     float extension_number(const tinygltf::Value& object, const char* name, double standard, double low, double high, const std::string& where)
@@ -1387,6 +1431,7 @@ class importer
                 desc.node = carrier;
                 desc.mesh = mesh_of(n, m, p);
                 if (desc.mesh.id == 0) { continue; }
+                node_meshes[n].push_back(desc.mesh);
                 if (!primitive.targets.empty()) { morphed_meshes[n].push_back(desc.mesh); }
                 desc.material = material_of(primitive.material);
                 es_instance instance;
@@ -1775,6 +1820,50 @@ class importer
         list<float> values{counted<float>(context)};
         read_floats(number, components, where, values);
         return data.emplace(number, std::move(values)).first->second;
+    }
+
+    /* ---- bodies, joints, cloth ------------------------------------------------------------------------------------------------------------------ */
+
+    void add_physics()
+    {
+        std::vector<es_gltf_physics_node> all(model.nodes.size());
+        std::vector<uint32_t> in_order;
+        std::set<size_t> animated;
+        for (const tinygltf::Animation& animation : model.animations) {
+            for (const tinygltf::AnimationChannel& channel : animation.channels) {
+                if (channel.target_node >= 0 && channel.target_path != "weights") { animated.insert(static_cast<size_t>(channel.target_node)); }
+            }
+        }
+        for (int each : order) {
+            size_t n = static_cast<size_t>(each);
+            es_gltf_physics_node& node = all[n];
+            node.rigid = extension(model.nodes[n].extensions, "KHR_physics_rigid_bodies");
+            node.extras = value_member(&model.nodes[n].extras, "earthshine");
+            node.animated = animated.count(n) > 0 || (parents[n] >= 0 && all[static_cast<size_t>(parents[n])].animated);
+            in_order.push_back(static_cast<uint32_t>(n));
+        }
+        for (size_t n = 0; n < all.size(); n++) {
+            all[n].node = nodes[n];
+            all[n].parent = parents[n];
+            all[n].skinned = model.nodes[n].skin >= 0;
+            auto meshes_of_node = node_meshes.find(n);
+            if (meshes_of_node != node_meshes.end()) {
+                all[n].meshes = meshes_of_node->second.data();
+                all[n].mesh_count = static_cast<uint32_t>(meshes_of_node->second.size());
+            }
+        }
+        es_gltf_physics physics{};
+        physics.context = context;
+        physics.world = world;
+        physics.path = path;
+        physics.values = &gltf_values;
+        physics.rigid = extension(model.extensions, "KHR_physics_rigid_bodies");
+        physics.shapes = extension(model.extensions, "KHR_implicit_shapes");
+        physics.nodes = all.data();
+        physics.node_count = static_cast<uint32_t>(all.size());
+        physics.order = in_order.data();
+        physics.order_count = static_cast<uint32_t>(in_order.size());
+        check(es_gltf_physics_add(&physics));
     }
 
     /* ---- the end -------------------------------------------------------------------------------------------------------------------------------- */

@@ -66,7 +66,22 @@ ES_API const char* const* es_scene_settings(const char* name);
 /* settings NULL: defaults. SCENE_UNKNOWN names the nearest. */
 ES_API es_result es_world_create_scene(es_context* context, const char* name, const es_world_settings* settings, es_world** world);
 /* .gltf or .glb by content. What is left out is warned of; what cannot be shown at all is refused. A file without a camera gets
- * one that frames it; without a light, a directional light of 3 W/m² from above the camera's left shoulder. */
+ * one that frames it; without a light, a directional light of 3 W/m² from above the camera's left shoulder.
+ *
+ * Skins, morph targets and animations play, also of lights, cameras and nodes by KHR_animation_pointer. Bodies come from
+ * KHR_physics_rigid_bodies with KHR_implicit_shapes, or, on nodes without it, from extras (all members optional, SI units, node's axes):
+ *   "extras": {"earthshine": {
+ *     "body": {"type": "dynamic" | "kinematic" | "static", "mass", "velocity": [x, y, z], "angularVelocity": [x, y, z], "linearDamping",
+ *              "angularDamping", "gravityScale", "continuous": false, "asleep": false,
+ *              "shapes": [SHAPE …], or one shape's members here},
+ *     "joint": {"type": "ball" | "hinge" | "distance" | "fixed", "to": node number (absent: the world), "limit": [low, high], "speed",
+ *               "maxForce", "maxTorque", "length", "hertz", "dampingRatio", "breakForce", "breakTorque", "collideConnected": false}}}
+ *   SHAPE: {"shape": "sphere" | "box" | "capsule" | "hull" | "mesh", "size": [x, y, z] or "radius", "height" (between a capsule's centres),
+ *           "position": [x, y, z], "rotation": [x, y, z, w], "density", "friction", "restitution", "rollingResistance", "sensor": false,
+ *           "category", "mask"}
+ * with the meanings and defaults of es_body_desc, es_shape_desc and es_joint_desc. The standard shape is the hull of the node's mesh, of static
+ * bodies the mesh; spheres, boxes and capsules without size fit it. A joint is at its node's place, a hinge turns about its z. Animated
+ * nodes are kinematic. What the solver does not have (of joints, inertia, combine modes) is left out with a warning. */
 ES_API es_result es_world_import_gltf(es_context* context, const char* path, const es_world_settings* settings, es_world** world);
 /* A built-in scene's name, or else a file. */
 ES_API es_result es_world_open(es_context* context, const char* scene_or_path, const es_world_settings* settings, es_world** world);

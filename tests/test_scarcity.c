@@ -359,7 +359,7 @@ static es_result scene(bench* w, const operation* o, void** object)
 }
 
 /* A world made from nothing, each object of it again and again until there is memory. */
-typedef struct making { bench made; int stage; es_camera camera; es_light light; es_texture texture; es_material material; es_mesh mesh; es_node node; es_instance instance; es_clip clip; } making;
+typedef struct making { bench made; int stage; es_camera camera; es_light light; es_texture texture; es_material material; es_mesh mesh; es_node node; es_instance instance; es_clip clip; es_mesh morphed; es_skin skin; } making;
 
 static es_result make_step(making* m, es_context* context)
 {
@@ -387,6 +387,12 @@ static es_result make_step(making* m, es_context* context)
     }
     case 8: return es_world_add_clip(world, &(es_clip_desc){"a clip", 1, &(es_clip_channel){m->node, ES_CLIP_TRANSLATION, ES_INTERPOLATE_LINEAR, 2, times, values}}, &m->clip);
     case 9: return es_world_play_clip(world, m->clip, true);
+    case 10:
+        return es_world_add_mesh(world, &(es_mesh_desc){.name = "a morphed mesh", .vertex_count = 3, .triangle_count = 1, .positions = corners, .normals = normals, .tangents = tangents,
+            .indices = indices, .target_count = 1, .targets = &(es_morph_target){corners, normals, corners}, .weights = times + 1}, &m->morphed);
+    case 11:
+        return es_world_add_skin(world, &(es_skin_desc){"a skin", m->morphed, m->node, 1, &m->node, NULL, 1, (const uint32_t[]){0, 0, 0}, (const float[]){1, 1, 1}}, &m->skin);
+    case 12: return es_world_recompute_normals(world, m->mesh);
     default: return es_world_step(world, 0.5f);
     }
 }
@@ -395,7 +401,7 @@ static es_result make(bench* w, const operation* o, void** object)
 {
     making* m = *object ? *object : calloc(1, sizeof *m);
     *object = m;
-    for (; m->stage < 11; m->stage++) {
+    for (; m->stage < 14; m->stage++) {
         es_result result = make_step(m, w->context);
         if (result) return result;
     }
