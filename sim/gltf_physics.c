@@ -201,6 +201,7 @@ es_result es_gltf_physics_add(const es_gltf_physics* physics)
     l.owner = l.bodies ? es_allocate_zero(physics->context, count * sizeof *l.owner) : NULL;
     es_result result = l.owner ? add_bodies(&l) : es_context_last_result(physics->context);
     if (result == ES_OK) result = es_gltf_add_joints(&l);
+    if (result == ES_OK) result = es_gltf_add_soft(&l);
     es_release(physics->context, l.owner, count * sizeof *l.owner);
     es_release(physics->context, l.bodies, count * sizeof *l.bodies);
     warn(&l, l.left.inertia, "bodies have a given centre of mass or inertia, which follow from their shapes here");

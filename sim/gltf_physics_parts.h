@@ -64,5 +64,6 @@ es_result es_gltf_add_collider(es_gltf_loader* l, uint32_t n, const void* collid
 es_result es_gltf_add_extras_shape(es_gltf_loader* l, uint32_t n, const void* from, const char* where, bool moves, const es_gltf_place* frame, es_gltf_shape_list* list);
 /* Of all nodes; the bodies are there. */
 es_result es_gltf_add_joints(es_gltf_loader* l);
+es_result es_gltf_add_soft(es_gltf_loader* l);
 
 #endif

@@ -1353,7 +1353,8 @@ class importer
         for (size_t t = 0; t < weights.size() && t < given.size(); t++) { weights[t] = number(given[t], -1e6, 1e6, at("meshes", m) + ".weights"); }
 
         static const char* const names[] = {"POSITION", "NORMAL", "TANGENT", "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
-        bool weighted = !primitive.targets.empty() && weighted_nodes.count(n) > 0;
+        bool weighted = !primitive.targets.empty() && weighted_nodes.count(n) > 0; /* vertices that move by themselves are shared with no other node */
+        weighted |= value_member(value_member(&node.extras, "earthshine"), "cloth") != nullptr;
         std::vector<int64_t> key{primitive.mode, primitive.indices, weighted ? static_cast<int64_t>(n) : -1};
         for (const char* name : names) { key.push_back(attribute(primitive, name)); }
         for (size_t t = 0; t < weights.size(); t++) {

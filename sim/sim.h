@@ -75,11 +75,14 @@ ES_API es_result es_world_create_scene(es_context* context, const char* name, co
  *              "angularDamping", "gravityScale", "continuous": false, "asleep": false,
  *              "shapes": [SHAPE …], or one shape's members here},
  *     "joint": {"type": "ball" | "hinge" | "distance" | "fixed", "to": node number (absent: the world), "limit": [low, high], "speed",
- *               "maxForce", "maxTorque", "length", "hertz", "dampingRatio", "breakForce", "breakTorque", "collideConnected": false}}}
+ *               "maxForce", "maxTorque", "length", "hertz", "dampingRatio", "breakForce", "breakTorque", "collideConnected": false},
+ *     "cloth": {"mass", "stretchCompliance", "shearCompliance", "bendCompliance", "volumeCompliance", "damping", "thickness", "friction", "drag",
+ *               "wind": [x, y, z], "pressure", "gravityScale", "selfCollision": false, "tearStretch", "substeps", "solid": spacing of its
+ *               tetrahedra (absent: a cloth), "pins": [vertex …], "pinsAbove": height in the node's axes, "to": node that holds the pins}}}
  *   SHAPE: {"shape": "sphere" | "box" | "capsule" | "hull" | "mesh", "size": [x, y, z] or "radius", "height" (between a capsule's centres),
  *           "position": [x, y, z], "rotation": [x, y, z, w], "density", "friction", "restitution", "rollingResistance", "sensor": false,
  *           "category", "mask"}
- * with the meanings and defaults of es_body_desc, es_shape_desc and es_joint_desc. The standard shape is the hull of the node's mesh, of static
+ * with the meanings and defaults of es_body_desc, es_shape_desc, es_joint_desc and es_soft_desc. The standard shape is the hull of the node's mesh, of static
  * bodies the mesh; spheres, boxes and capsules without size fit it. A joint is at its node's place, a hinge turns about its z. Animated
  * nodes are kinematic. What the solver does not have (of joints, inertia, combine modes) is left out with a warning. */
 ES_API es_result es_world_import_gltf(es_context* context, const char* path, const es_world_settings* settings, es_world** world);

@@ -119,7 +119,7 @@ static void near(double value, double expected, double tolerance)
     "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAACAAEAAAABAAMAAAADAAIAAQACAAMA'}]," \
     "'bufferViews':[{'buffer':0,'byteLength':48},{'buffer':0,'byteOffset':48,'byteLength':24}]," \
     "'accessors':[{'bufferView':0,'componentType':5126,'count':4,'type':'VEC3'},{'bufferView':1,'componentType':5123,'count':12,'type':'SCALAR'}]," \
-    "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
+    "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'indices':1}]},{'primitives':[{'attributes':{'POSITION':0},'indices':1}]}],"
 #define FILE_JSON(rigid, shapes, nodes) "{'asset':{'version':'2.0'},'extensionsUsed':['KHR_physics_rigid_bodies','KHR_implicit_shapes']," MESH \
     "'extensions':{'KHR_physics_rigid_bodies':{" rigid "},'KHR_implicit_shapes':{'shapes':[" shapes "]}},'nodes':[" nodes "]}"
 #define RIGID(members) "'extensions':{'KHR_physics_rigid_bodies':{" members "}}"
@@ -234,6 +234,19 @@ static void extras(void** state)
     es_world_destroy(world);
 }
 
+static void cloth(void** state)
+{
+    es_world* world = load(FILE_JSON("", "", "{'name':'flag','mesh':0,'translation':[0,3,0]," EXTRAS("'cloth':{'mass':0.5,'pins':[1],'pinsAbove':0.5,'drag':0,'selfCollision':true}") "},"
+        "{'mesh':1,'translation':[0,1,0]," EXTRAS("'cloth':{'solid':0.25,'mass':2}") "}"));
+    assert_int_equal(count_of(world, ES_OBJECT_SOFT), 2);
+    steps(world, 30);
+    const es_raster_mesh* mesh = es_world_draw_list(world)->instances[0].mesh;
+    near(mesh->positions[4], 1, 1e-3), near(mesh->positions[5], 0, 1e-3);     /* pinned by its number */
+    near(mesh->positions[8], 0, 1e-3), near(mesh->positions[9], 1, 1e-3);     /* by its height */
+    assert_true(mesh->positions[13] < -0.05f);                                 /* the corner at z = 1 swings down */
+    es_world_destroy(world);
+}
+
 static void damaged(void** state)
 {
 #define NODE(members) FILE_JSON(JOINTS ",'physicsMaterials':[{'dynamicFriction':-1},{'frictionCombine':'mean'},7],'collisionFilters':[{'collisionSystems':[3]}]", \
@@ -271,6 +284,11 @@ static void damaged(void** state)
         {"joint.to: names a node that is no body", NODE(EXTRAS("'body':{},'joint':{'to':0}"))},
         {"joint.type", NODE(EXTRAS("'body':{},'joint':{'type':'weld'}"))},
         {"needs a mesh", FILE_JSON("", "", "{" EXTRAS("'body':{}") "}")},
+        {"cloth: must be an object", NODE(EXTRAS("'cloth':[1]"))},
+        {"cloth.mass", NODE(EXTRAS("'cloth':{'mass':0}"))},
+        {"cloth.pins[1]", NODE(EXTRAS("'cloth':{'pins':[0,4]}"))},
+        {"cloth.solid", NODE(EXTRAS("'cloth':{'solid':0.5,'pins':[0]}"))},
+        {"cloth: needs a mesh", FILE_JSON("", "", "{" EXTRAS("'cloth':{'mass':1}") "}")},
         {"needs its size", FILE_JSON("", "", "{" EXTRAS("'body':{'shape':'box'}") "}")},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) refuse(cases[i].part, cases[i].json);
@@ -281,6 +299,6 @@ int main(void)
 #ifndef ES_WITH_TINYGLTF
     return 77;
 #endif
-    const struct CMUnitTest tests[] = {cmocka_unit_test(falling), cmocka_unit_test(filters_and_triggers), cmocka_unit_test(joints), cmocka_unit_test(extras), cmocka_unit_test(damaged)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(falling), cmocka_unit_test(filters_and_triggers), cmocka_unit_test(joints), cmocka_unit_test(extras), cmocka_unit_test(cloth), cmocka_unit_test(damaged)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
