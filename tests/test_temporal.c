@@ -164,7 +164,7 @@ static void test_settles(void** state)
     const uint64_t blended = hash_of(&s, "irradiance");
     for (uint32_t i = 0; i < settings.temporal_settle + 2; i++) render(&s);
     const es_frame_stats* stats = es_renderer_stats(s.renderer);
-    for (size_t i = 0; i < stats->pass_count; i++) 
+    for (size_t i = 0; i < stats->pass_count; i++)
         if (!stats->passes[i].skipped) fail_msg("%s runs though the picture has settled", stats->passes[i].name);
     assert_true(mean_of(&s, "confidence") == 0.0);
     const uint64_t settled = hash_of(&s, "irradiance"), shown = hash_of(&s, "display");

@@ -15,7 +15,7 @@ endif()
 if(EARTHSHINE_WITH_TINYGLTF)
   list(APPEND fuzz_targets gltf)
 endif()
-set(fuzz_demos options.c output.c messages.c settings.c)
+set(fuzz_demos options.c output.c messages.c setting_slider.c settings.c text.c)
 list(TRANSFORM fuzz_demos PREPEND ${CMAKE_SOURCE_DIR}/demos/)
 
 function(fuzz_program program)

@@ -120,7 +120,7 @@ static void write_exr(const exr_seed* seed)
     FUZZ_CHECK(code == EXR_ERR_SUCCESS, "%s: %s", seed->name, exr_get_default_error_message(code));
     for (int p = 0; p < seed->parts && code == EXR_ERR_SUCCESS; p++) {
         int part;
-        char name[8];
+        char name[16];
         snprintf(name, sizeof name, "part%d", p);
         code = exr_add_part(file, name, seed->tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
         if (code == EXR_ERR_SUCCESS) code = exr_initialize_required_attr_simple(file, part, 18, 20, seed->compression);
