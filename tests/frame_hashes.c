@@ -8,7 +8,8 @@
  * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
  * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps;
  * `half-temporal` and `temporal` blend light with that of the frame before, `antialiased` the picture as well;
- * `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
+ * `moving` are the scenes
+ * that move by themselves, with the hash of the world's state after a second; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
  *        frame_hashes --isas
@@ -393,6 +394,51 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     free(made);
 }
 
+/* ---- scenes that move by themselves --------------------------------------------------------------------------------------------- */
+
+static bool moves_by_itself(const char* scene)
+{
+    for (size_t i = 0; i < sizeof plans / sizeof *plans; i++)
+        if (strcmp(scene, plans[i].name) == 0) return false;
+    return true;
+}
+
+/* Bodies, cloth, skins and movers for a second, pictures of three frames of it with what the scene recommends, made small. */
+static void print_moving(es_context* context, const char* scene, bool skip, const char* folder)
+{
+    es_world_settings world_settings = es_default_world_settings();
+    world_settings.triangles = 2500;
+    es_renderer_settings settings = es_default_renderer_settings();
+    for (const char* const* text = es_scene_settings(scene); *text; text++) {
+        char name[64];
+        const char* equals = strchr(*text, '=');
+        snprintf(name, sizeof name, "%.*s", (int)(equals - *text), *text);
+        check(context, es_renderer_settings_set(context, &settings, name, equals + 1), *text);
+    }
+    settings.width = 97;
+    settings.height = 71;
+    settings.skip = skip;
+    settings.shadow_size = 64;
+    settings.light_size = 32;
+    settings.vpls = 48;
+    settings.interleave = 4;
+    settings.ism_size = 32;
+    settings.ism_points = 512;
+    settings.ism_pool = 8192;
+    es_world* world;
+    es_renderer* renderer;
+    check(context, es_world_create_scene(context, scene, &world_settings, &world), scene);
+    check(context, es_renderer_create(context, &settings, &renderer), "creating a renderer");
+    for (int frame = 1; frame <= 30; frame++) {
+        check(context, es_world_step(world, 1.0f / 30), "a step");
+        if (frame == 10 || frame == 11) check(context, es_renderer_render(renderer, world), "rendering");
+        if (frame == 12) print_images(context, renderer, world, scene, "moving", folder);
+    }
+    printf("%s moving world %016" PRIx64 "\n", scene, es_world_hash(world));
+    es_renderer_destroy(renderer);
+    es_world_destroy(world);
+}
+
 int main(int argc, char** argv)
 {
     es_context_desc desc = es_default_context_desc();
@@ -428,6 +474,12 @@ int main(int argc, char** argv)
         bool wanted = chosen_count == 0;
         for (int k = 0; k < chosen_count; k++) wanted |= strcmp(chosen[k], plans[i].name) == 0;
         if (wanted) print_frames(context, &plans[i], skip, folder);
+    }
+    for (size_t i = 0; i < es_scene_count(); i++) {
+        const char* scene = es_scene_name(i);
+        bool wanted = chosen_count == 0;
+        for (int k = 0; k < chosen_count; k++) wanted |= strcmp(chosen[k], scene) == 0;
+        if (wanted && moves_by_itself(scene)) print_moving(context, scene, skip, folder);
     }
     es_context_destroy(context);
     return fflush(stdout) == 0 && !ferror(stdout) ? 0 : 1;

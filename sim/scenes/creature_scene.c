@@ -4,7 +4,7 @@
 
 #include "platform/maths.h"
 
-enum { LAMPS = 24, BALLS = 7 };
+enum { LAMPS = 16, BALLS = 7 };
 static const float ring = 1.9f, arc_radius = 3.1f, walk_period = 1.3f;
 
 static es_vec3 arc_point(float share, float beyond)

@@ -16,7 +16,7 @@ static const es_scene scenes[] = {
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
     {"hall", "a colonnade lit from its side aisle, for the most part by what the walls give back (108,516 triangles)", es_scene_hall},
     {"cornell-stack", "a stack of cubes in a Cornell box, a ball that brings it down, a lamp that sways (3,372 triangles)", es_scene_cornell_stack, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
-    {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "shadow.size=512")},
+    {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature, SETTINGS(STEADY, "vpl.count=512", "ism.points=2048", "vpl.light-size=64", "shadow.size=256")},
     {"curtain", "a curtain in a doorway opens and closes the light of a room", es_scene_curtain, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "exposure=0.7")},
     {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096")},
     {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096")},
