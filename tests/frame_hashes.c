@@ -12,9 +12,9 @@
  * that move by themselves, with the hash of the world's state after a second; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
- *        frame_hashes --isas
+ *        frame_hashes --isas | --scenes
  *   --write  also keeps every image as DIR/SCENE-FRAME-IMAGE.exr, to look at what changed
- *   --isas   prints the instruction sets at hand
+ *   --isas   prints the instruction sets at hand; --scenes all scenes' names
  */
 #include <earthshine/gi.h>
 
@@ -443,13 +443,18 @@ int main(int argc, char** argv)
 {
     es_context_desc desc = es_default_context_desc();
     bool skip = true;
-    const char *chosen[16], *folder = NULL;
+    const char *chosen[32], *folder = NULL;
     int chosen_count = 0;
     for (int i = 1; i < argc; i++) {
         es_isa isa;
         if (strcmp(argv[i], "--isas") == 0) {
             for (int k = 0; k < ES_ISA_COUNT; k++)
                 if (es_isa_available_mask() >> k & 1) puts(es_isa_name((es_isa)k));
+            return 0;
+        } else if (strcmp(argv[i], "--scenes") == 0) {
+            for (size_t k = 0; k < es_scene_count(); k++)
+                if (moves_by_itself(es_scene_name(k))) printf("%s ", es_scene_name(k));
+            for (size_t k = 0; k < sizeof plans / sizeof *plans; k++) printf("%s%s", plans[k].name, k + 1 < sizeof plans / sizeof *plans ? " " : "\n");
             return 0;
         } else if (strcmp(argv[i], "--threads") == 0 && i + 1 < argc) {
             desc.threads = (uint32_t)strtoul(argv[++i], NULL, 10);
@@ -460,10 +465,10 @@ int main(int argc, char** argv)
             skip = false;
         } else if (strcmp(argv[i], "--write") == 0 && i + 1 < argc) {
             folder = argv[++i];
-        } else if (argv[i][0] != '-' && chosen_count < 16) {
+        } else if (argv[i][0] != '-' && chosen_count < 32) {
             chosen[chosen_count++] = argv[i];
         } else {
-            fprintf(stderr, "frame_hashes: %s: not understood; [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …] or --isas\n", argv[i]);
+            fprintf(stderr, "frame_hashes: %s: not understood; [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …], --isas or --scenes\n", argv[i]);
             return 2;
         }
     }
