@@ -147,6 +147,9 @@ int bench_time(const bench_options* options);
 size_t bench_time_rows(bench_row* rows, size_t capacity);
 /* n × n points, so many steps: the median step, the most stretched edge and the deepest place in the sphere (m, negative: none) at the end. */
 bool bench_cloth(uint32_t n, uint32_t threads, uint32_t steps, double* milliseconds, double* stretch, double* deepest);
+/* bench_bounces.c */
+int bench_bounces(const bench_options* options);
+size_t bench_bounces_rows(bench_row* rows, size_t capacity);
 /* bench_ledger.c */
 int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 /* One frame of --stats: {"frame":0,"ms":…,"passes":[{"name":…,"ms":…,"skipped":null|"why","count":…,"unit":…}],
- *  "raster":{…}} */
+ *  "bounces":[{"bounce":1,"vpls":…,"power":[R,G,B],"ms":…,"map_ms":…}],"raster":{…}} */
 static void add_frame_stats(demo_text* text, uint32_t frame, const es_frame_stats* stats)
 {
     demo_text_add(text, "\n{\"frame\":%u,\"ms\":%.6g,\"passes\":[", frame, stats->milliseconds);
@@ -22,6 +22,12 @@ static void add_frame_stats(demo_text* text, uint32_t frame, const es_frame_stat
         demo_text_add(text, ",\"count\":%" PRIu64 ",\"unit\":", pass->count);
         demo_text_add_json_string(text, pass->unit ? pass->unit : "");
         demo_text_add(text, "}");
+    }
+    demo_text_add(text, "],\n \"bounces\":[");
+    for (size_t i = 0; i < stats->bounce_count; i++) {
+        const es_bounce_stats* b = &stats->bounces[i];
+        demo_text_add(text, "%s{\"bounce\":%zu,\"vpls\":%u,\"power\":[%.6g,%.6g,%.6g],\"ms\":%.6g,\"map_ms\":%.6g}", i ? "," : "", i + 1, b->vpls, b->power[0], b->power[1], b->power[2],
+            b->milliseconds, b->map_milliseconds);
     }
     const es_raster_stats* raster = &stats->raster;
     demo_text_add(text,

@@ -213,6 +213,8 @@ int demo_find_image(const char* name)
     enum { MOST = 128 };
     const char* names[MOST];
     size_t count = 0;
+    int bounce = 0, end = 0; /* one stands in the list for all bounces */
+    if (sscanf(name, "indirect-%d%n", &bounce, &end) == 1 && !name[end] && bounce >= 1 && bounce <= ES_MAX_BOUNCES) name = "indirect-1";
     for (size_t i = 0; i < es_image_name_count() && i < MOST; i++) {
         if (!strcmp(es_image_name(i), name)) return (int)i;
         names[count++] = es_image_name(i);

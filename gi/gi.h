@@ -41,6 +41,15 @@ typedef enum es_antialias {
     ES_ANTIALIAS_SUPERSAMPLE  /* the mean over antialias_samples whole pictures, each frame by itself: for stills and recordings */
 } es_antialias;
 
+/* Where the lights of a bounce after the first stand. Both have as many lights a bounce as asked for, each of which reflects a share of
+ * the lights of the bounce before, and both choose at random, with a probability by what is received and reflected, the power divided by it. */
+typedef enum es_bounce_method {
+    ES_BOUNCE_ONE_PASS,   /* on one of a few points of the scene that the reflected light's own shadow map says it sees (Knecht §3.6, and what §6.1 asks for) */
+    ES_BOUNCE_REFLECTIVE  /* on a texel of an imperfect reflective shadow map drawn for the reflected light (Ritschel thesis §5.3.1); slower, less noisy */
+} es_bounce_method;
+
+enum { ES_MAX_BOUNCES = 16 };
+
 typedef enum es_tone_map { ES_TONE_MAP_REINHARD, ES_TONE_MAP_PBR_NEUTRAL, ES_TONE_MAP_LINEAR } es_tone_map;
 
 /* All of them by name through es_renderer_settings_set; `earthshine settings` prints names, ranges and defaults. */
@@ -110,7 +119,11 @@ typedef struct es_renderer_settings {
     uint32_t tone_map;               /* es_tone_map */
     float exposure;                  /* stops */
     float white;                     /* REINHARD: radiance times exposure that is shown as white */
-    uint32_t bounces;                /* 0: none; 1: one indirect bounce */
+    /* several bounces */
+    uint32_t bounces;                /* 0: none; 1: one indirect bounce; … ES_MAX_BOUNCES */
+    uint32_t bounce_method;          /* es_bounce_method */
+    uint32_t bounce_vpls;            /* lights of each bounce after the first */
+    uint32_t bounce_points;          /* ONE_PASS: points tried for each light that is reflected */
 } es_renderer_settings;
 
 ES_API es_renderer_settings es_default_renderer_settings(void);
@@ -135,7 +148,8 @@ ES_API es_result es_renderer_render(es_renderer* renderer, es_world* world);
 ES_API size_t es_image_name_count(void);
 ES_API const char* es_image_name(size_t index);         /* "display" first: what a window shows */
 ES_API const char* es_image_description(size_t index);
-/* A copy of one image of the last frame as plain floats, made on request; the caller destroys it. IMAGE_UNKNOWN names the nearest. */
+/* A copy of one image of the last frame as plain floats, made on request; the caller destroys it. IMAGE_UNKNOWN names the nearest.
+ * "indirect-1" … "indirect-16" are single bounces, black beyond es_renderer_settings.bounces; their lights are shaded again for it. */
 ES_API es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* image);
 /* The displayed image as 0x00RRGGBB, width × height words, top row first; valid until the next call on the renderer. */
 ES_API const uint32_t* es_renderer_display(es_renderer* renderer, uint32_t* width, uint32_t* height);
@@ -151,18 +165,28 @@ typedef struct es_pass_stats {
     uint64_t count;           /* what `unit` says, e.g. triangles, virtual point lights, points */
     const char* unit;
 } es_pass_stats;
+/* Of the virtual point lights that send the n-th bounce to the picture. */
+typedef struct es_bounce_stats {
+    uint32_t vpls;
+    double power[3];          /* W that reach the surfaces they stand for, before those reflect any: red, green, blue */
+    double milliseconds;      /* to place them, when the pass last ran; 0 for the first bounce, which is a pass of its own */
+    double map_milliseconds;  /* to draw their shadow maps, likewise */
+} es_bounce_stats;
 typedef struct es_frame_stats {
     uint64_t frame;           /* frames rendered before this one */
     double milliseconds;
     const es_pass_stats* passes;
     size_t pass_count;
     es_raster_stats raster;   /* of the camera's G-buffer */
+    const es_bounce_stats* bounces; /* of bounce 1, 2, …; valid until the next frame */
+    size_t bounce_count;      /* 0 without indirect light */
 } es_frame_stats;
 ES_API const es_frame_stats* es_renderer_stats(const es_renderer* renderer);
 
 typedef struct es_vpl {
     es_vec3 position, normal;
     float flux[3];            /* radiant exitance × area share: intensity along the normal is flux / pi, W/sr */
+    uint32_t bounce;          /* that it sends to the picture, from 1 */
 } es_vpl;
 /* Virtual point lights of the last frame, relative to es_world_origin, for overlays. */
 ES_API size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t capacity);

@@ -1,6 +1,7 @@
 /* Named images of the last frame, made on request from the planes the passes left. */
 #include <string.h>
 
+#include "gi/bounce_pass.h"
 #include "gi/renderer.h"
 #include "platform/context.h"
 #include "platform/maths.h"
@@ -8,7 +9,7 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE
 } image_kind;
@@ -18,6 +19,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_RADIANCE, "radiance", "direct + indirect + emission, W/(m² sr)"},
     {IMAGE_DIRECT, "direct", "reflected direct light, W/(m² sr)"},
     {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
+    {IMAGE_BOUNCE, "indirect-1", "of the indirect light, the first bounce; indirect-2 … indirect-16 likewise; their sum is it to the bit"},
     {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
     {IMAGE_CONFIDENCE, "confidence", "in last frame's indirect light, 0 to 1 (Knecht eq. 3.4)"},
@@ -45,6 +47,20 @@ enum { IMAGE_COUNT = sizeof images / sizeof images[0] };
 size_t es_image_name_count(void) { return IMAGE_COUNT; }
 const char* es_image_name(size_t index) { return index < IMAGE_COUNT ? images[index].name : NULL; }
 const char* es_image_description(size_t index) { return index < IMAGE_COUNT ? images[index].description : NULL; }
+
+/* n of "indirect-n", 1 … ES_MAX_BOUNCES; 0: another name. */
+static uint32_t bounce_of(const char* name)
+{
+    static const char prefix[] = "indirect-";
+    if (strncmp(name, prefix, sizeof prefix - 1) != 0) return 0;
+    uint32_t n = 0;
+    for (const char* c = name + sizeof prefix - 1; *c; c++) {
+        if (*c < '0' || *c > '9' || (!n && *c == '0')) return 0;
+        n = 10 * n + (uint32_t)(*c - '0');
+        if (n > ES_MAX_BOUNCES) return 0;
+    }
+    return n;
+}
 
 /* ---- from packed planes --------------------------------------------------------------------------------------------------- */
 
@@ -233,7 +249,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     if (!renderer->complete) return es_misuse(context, ES_WRONG_STATE, "image \"%s\": no frame has been rendered, or the last one failed", name);
     int index = -1;
     for (int i = 0; i < IMAGE_COUNT; i++)
-        if (strcmp(images[i].name, name) == 0) index = i;
+        if (strcmp(images[i].name, name) == 0 || (images[i].kind == IMAGE_BOUNCE && bounce_of(name))) index = i;
     if (index < 0) return unknown_image(renderer, name);
     image_kind kind = images[index].kind;
 
@@ -268,6 +284,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_RADIANCE:
     case IMAGE_INDIRECT:
     case IMAGE_INDIRECT_UNFILTERED: result = put_composed(renderer, kind, image); break;
+    case IMAGE_BOUNCE: result = es_bounce_image(renderer, bounce_of(name), image); break;
     case IMAGE_DIRECT:
     case IMAGE_IRRADIANCE:
     case IMAGE_COMPENSATION: {

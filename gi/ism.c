@@ -178,12 +178,12 @@ static void draw_map(const ism_loop* loop, uint32_t v, uint16_t* work, gathered_
     else memcpy(map, work, texels * sizeof *map);
 }
 
-/* Lights that share a subset follow each other, so its points are read from the caches: item i is light subset + k · subsets. */
+/* Lights that share a subset follow each other, so its points are read from the caches: item i is light first + subset + k · subsets. */
 static void draw_maps(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const ism_loop* loop = user;
     uint16_t* work = loop->scratch + worker * loop->scratch_texels;
-    const uint32_t count = loop->job->vpl_count, subsets = loop->subsets ? loop->subsets : 1;
+    const uint32_t first = loop->job->first, count = loop->job->vpl_count - first, subsets = loop->subsets ? loop->subsets : 1;
     const uint32_t low = count / subsets, larger = count % subsets; /* the first `larger` subsets have low + 1 lights */
     for (uint32_t i = begin; i < end; i++) {
         uint32_t border = larger * (low + 1), subset, k;
@@ -194,7 +194,7 @@ static void draw_maps(void* user, uint32_t begin, uint32_t end, uint32_t worker)
             subset = larger + (i - border) / low;
             k = (i - border) % low;
         }
-        draw_map(loop, subset + k * subsets, work, &loop->gathered[worker]);
+        draw_map(loop, first + subset + k * subsets, work, &loop->gathered[worker]);
     }
 }
 
@@ -205,7 +205,7 @@ static uint64_t key_of(const ism_loop* loop)
     const es_ism_job* job = loop->job;
     const es_scene_points* points = job->points;
     const float numbers[] = {job->far_distance, job->near_distance};
-    const uint64_t words[] = {job->size, job->vpl_count, job->pull_push, loop->fill.levels, loop->fill.pull, loop->fill.push, points->subset_size, points->subset_count, points->source_count, points->layout};
+    const uint64_t words[] = {job->size, job->room, job->pull_push, loop->fill.levels, loop->fill.pull, loop->fill.push, points->subset_size, points->subset_count, points->source_count, points->layout};
     return es_hash_bytes(es_hash_bytes(1, numbers, sizeof numbers), words, sizeof words) | 1;
 }
 
@@ -230,16 +230,30 @@ static void choose_still(es_ism_kept* kept, const es_scene_points* points, uint3
     for (uint32_t v = 0; v < map_count; v++) kept->maps[v].layered = false;
 }
 
+/* Which points go into layers, and when they last moved. */
+static void use_kept(es_ism_kept* kept, ism_loop* loop)
+{
+    const es_scene_points* points = loop->job->points;
+    bool still = false, others = false;
+    for (uint32_t i = 0; i < points->source_count; i++) {
+        still |= kept->still[i];
+        others |= !kept->still[i];
+        if (points->sources[i].placed > loop->moved) loop->moved = points->sources[i].placed;
+    }
+    loop->layers = still && others;
+    loop->kept = kept;
+}
+
 static es_result prepare_kept(es_context* context, es_ism_kept* kept, uint64_t last_key, ism_loop* loop)
 {
     const es_ism_job* job = loop->job;
     const es_scene_points* points = job->points;
     const size_t map_texels = (size_t)job->size * job->size;
     size_t layers = job->kept_bytes / (map_texels * sizeof(uint16_t));
-    if (layers > job->vpl_count) layers = job->vpl_count;
+    if (layers > job->room) layers = job->room;
     bool fresh = last_key != key_of(loop);
     kept->key = 0;
-    if (!es_grow(context, (void**)&kept->maps, &kept->map_capacity, fresh ? 0 : job->vpl_count, job->vpl_count, sizeof *kept->maps)) return es_context_last_result(context);
+    if (!es_grow(context, (void**)&kept->maps, &kept->map_capacity, fresh ? 0 : job->room, job->room, sizeof *kept->maps)) return es_context_last_result(context);
     if (!es_grow(context, (void**)&kept->still, &kept->source_capacity, fresh ? 0 : points->source_count, points->source_count, 1)) return es_context_last_result(context);
     if (layers * map_texels > kept->layer_capacity || (!layers && kept->layers)) {
         es_release(context, kept->layers, kept->layer_capacity * sizeof *kept->layers);
@@ -251,20 +265,13 @@ static es_result prepare_kept(es_context* context, es_ism_kept* kept, uint64_t l
     }
     kept->layer_count = (uint32_t)layers;
     if (fresh) {
-        memset(kept->maps, 0, job->vpl_count * sizeof *kept->maps);
+        memset(kept->maps, 0, job->room * sizeof *kept->maps);
         memset(kept->still, 0, points->source_count);
         kept->time = points->time;
     } else {
-        choose_still(kept, points, job->vpl_count);
+        choose_still(kept, points, job->room);
     }
-    bool still = false, others = false;
-    for (uint32_t i = 0; i < points->source_count; i++) {
-        still |= kept->still[i];
-        others |= !kept->still[i];
-        if (points->sources[i].placed > loop->moved) loop->moved = points->sources[i].placed;
-    }
-    loop->layers = still && others;
-    loop->kept = kept;
+    use_kept(kept, loop);
     return ES_OK;
 }
 
@@ -272,15 +279,19 @@ es_result es_ism_maps_build(es_context* context, es_ism_maps* maps, const es_ism
 {
     const uint64_t last_key = maps->kept.key;
     const uint16_t* last_texels = maps->texels;
-    es_result result = es_ism_maps_reserve(context, maps, job->size, job->vpl_count, job->far_distance);
+    es_result result = job->first ? ES_OK : es_ism_maps_reserve(context, maps, job->size, job->room, job->far_distance);
     if (result) return result;
+    maps->count = job->vpl_count;
     const uint32_t workers = es_context_workers(context);
     ism_loop loop = {.job = job, .kernels = es_raster_kernels_of(es_context_isa(context)), .maps = maps->texels};
     loop.subsets = job->points && job->points->subset_size ? job->points->subset_count : 0;
     loop.fill = (es_pull_push_parameters){.size = job->size, .levels = job->pull_push_levels,
         .pull = (uint32_t)(es_clampf(job->pull_threshold, 0.0f, 1.0f) * (float)ES_PARABOLIC_DEPTH_MAX),
         .push = (uint32_t)(es_clampf(job->push_threshold, 0.0f, 1.0f) * (float)ES_PARABOLIC_DEPTH_MAX)};
-    if (job->keep && loop.subsets) result = prepare_kept(context, &maps->kept, last_texels == maps->texels ? last_key : 0, &loop);
+    if (job->keep && loop.subsets && !job->first) result = prepare_kept(context, &maps->kept, last_texels == maps->texels ? last_key : 0, &loop);
+    /* later maps go by what was chosen for the first, of the same points; if those were drawn without, none stands */
+    else if (job->keep && loop.subsets && last_key == key_of(&loop) && maps->kept.time == job->points->time) use_kept(&maps->kept, &loop);
+    else if (job->first) maps->kept.key = 0;
     if (result) return result;
     es_arena scratch;
     es_arena_init(&scratch, context, 1 << 16);
@@ -298,11 +309,11 @@ es_result es_ism_maps_build(es_context* context, es_ism_maps* maps, const es_ism
     }
     if (!all) result = es_context_last_result(context);
     if (!result) {
-        es_parallel_for(context, job->vpl_count, 4, draw_maps, &loop);
+        es_parallel_for(context, job->vpl_count - job->first, 4, draw_maps, &loop);
         es_ism_kept* kept = &maps->kept;
-        kept->splats = loop.kept ? 0 : (uint64_t)job->vpl_count * (loop.subsets ? job->points->subset_size : 0);
+        kept->splats = loop.kept ? 0 : (uint64_t)(job->vpl_count - job->first) * (loop.subsets ? job->points->subset_size : 0);
         kept->stood = 0;
-        for (uint32_t v = 0; v < job->vpl_count && loop.kept; v++) {
+        for (uint32_t v = job->first; v < job->vpl_count && loop.kept; v++) {
             kept->splats += kept->maps[v].splats;
             kept->stood += !kept->maps[v].splats;
         }

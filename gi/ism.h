@@ -26,7 +26,7 @@ typedef struct es_ism_kept {
     uint8_t* still;            /* per es_scene_points.sources: its points are in the layers */
     size_t source_capacity;
     uint64_t time;             /* es_scene_points.time of the last build */
-    uint64_t splats;           /* points drawn by the last build */
+    uint64_t splats;           /* points drawn by the last build, whether of all maps or of the last */
     uint32_t stood;            /* maps that it left as they were */
 } es_ism_kept;
 
@@ -42,6 +42,8 @@ typedef struct es_ism_maps {
 typedef struct es_ism_job {
     const es_vpl_record* vpls;
     uint32_t vpl_count;
+    uint32_t first;                 /* maps [first, vpl_count) are drawn; those before stand, drawn by a job like it from the same points */
+    uint32_t room;                  /* maps that there will be in all; a job with `first` 0 reserves them */
     const es_scene_points* points;  /* map v is drawn from subset v mod subset_count */
     uint32_t size;                  /* a multiple of 32 with pull-push, else 4 … 1024 */
     float far_distance;             /* the scene's extent: no two points are farther apart */
@@ -56,7 +58,7 @@ typedef struct es_ism_job {
 /* Makes room for `count` maps of size² (contents undefined) without giving memory back; sets size, count and far_distance. Nothing of the last
  * build stands after it. */
 es_result es_ism_maps_reserve(es_context* context, es_ism_maps* maps, uint32_t size, uint32_t count, float far_distance);
-/* Draws all maps of a frame. Without points every map is empty, so nothing is shadowed. */
+/* Draws the maps of a frame, or the last of them. Without points every map is empty, so nothing is shadowed. */
 es_result es_ism_maps_build(es_context* context, es_ism_maps* maps, const es_ism_job* job);
 void es_ism_maps_free(es_context* context, es_ism_maps* maps);
 

@@ -3,6 +3,7 @@
 #define EARTHSHINE_GI_KERNEL_TABLE_H
 
 #include "gi/antialias.h"
+#include "gi/bounces.h"
 #include "gi/compose.h"
 #include "gi/direct.h"
 #include "gi/error/flip.h"
@@ -27,6 +28,11 @@
     /* a smaller image to the whole one's rows [row_begin, row_end) */                                         \
     X(upsample, (const es_upsample_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
+    /* gi/bounces.h */                                                                                           \
+    X(bounce_weights, (const es_bounce_sender* sender, const es_surfel_set* points, float* weights, float* sums)) \
+    X(reflective_splat, (const es_bounce_sender* sender, const es_surfel_set* points, const es_reflective_map* map)) \
+    X(reflective_fill, (const es_reflective_map* map))                                                           \
+    X(reflective_weights, (const es_bounce_sender* sender, const es_surfel_set* points, const es_reflective_map* map, float* weights, float* sums)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
     X(antialias, (const es_antialias_job* job, uint32_t row_begin, uint32_t row_end))                            \

@@ -17,6 +17,7 @@
     X(ISM, "imperfect shadow maps", "points")                                                                    \
     X(CLASSIC, "classic shadow maps", "maps")                                                                    \
     X(HIERARCHY, "ray hierarchy", "triangles")                                                                   \
+    X(BOUNCES, "bounces", "lights")                                                                              \
     X(DIRECT, "direct", "lights")                                                                                \
     X(SHADING, "shading", "samples")                                                                             \
     X(COMPENSATION, "bias compensation", "samples")                                                              \

@@ -3,9 +3,11 @@
 
 #include <string.h>
 
+#include "gi/bounce_pass.h"
 #include "gi/classic.h"
 #include "gi/direct.h"
 #include "gi/indirect.h"
+#include "gi/passes.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -45,6 +47,7 @@ static es_result check_settings(es_context* context, const es_renderer_settings*
     if (!power_of_two(s->ism_size)) return es_fail(context, ES_SETTING_VALUE, "ism.size is %u; 32, 64, 128 and 256 are accepted", s->ism_size);
     if (!power_of_two(s->classic_size)) return es_fail(context, ES_SETTING_VALUE, "classic.size is %u; a power of two from 32 to 1024 is accepted", s->classic_size);
     if (s->shadow_size % 8) return es_fail(context, ES_SETTING_VALUE, "shadow.size is %u; a multiple of 8 from 16 to 8192 is accepted", s->shadow_size);
+    if (s->bounce_points % 64) return es_fail(context, ES_SETTING_VALUE, "bounce.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->bounce_points);
     if (s->ism_points % 64) return es_fail(context, ES_SETTING_VALUE, "ism.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->ism_points);
     return ES_OK;
 }
@@ -105,6 +108,8 @@ void es_renderer_destroy(es_renderer* renderer)
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
     es_scene_points_free(context, &renderer->points);
     es_stable_vpls_free(context, &renderer->stable);
+    es_scene_points_free(context, &renderer->bounce_points);
+    es_surfels_free(context, &renderer->surfels);
     es_ism_maps_free(context, &renderer->maps);
     es_trace_scene_free(&renderer->trace_scene);
     es_arena_free(&renderer->arena);
@@ -163,7 +168,7 @@ static es_result reserve_vpls(es_renderer* renderer, uint32_t count)
     if (count <= renderer->vpl_capacity) return ES_OK;
     es_context* context = renderer->context;
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
-    renderer->vpl_capacity = renderer->vpl_count = 0;
+    renderer->vpl_capacity = renderer->vpl_count = renderer->first_vpls = 0;
     renderer->vpls = es_allocate_array(context, count, sizeof *renderer->vpls);
     if (!renderer->vpls) return es_context_last_result(context);
     renderer->vpl_capacity = count;
@@ -263,7 +268,7 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     if (in->no_indirect) {
         es_plan_not_needed(plan, ES_PASS_VPLS, in->no_indirect);
-        r->vpl_count = 0;
+        r->vpl_count = r->first_vpls = 0;
         return ES_OK;
     }
     es_vpl_request request = {.count = r->settings.vpls, .seed = r->settings.seed, .subsets = r->settings.interleave * r->settings.interleave, .glossy = r->settings.glossy_vpls};
@@ -271,7 +276,7 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_LIGHT_VIEWS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
     const bool stable = r->settings.stable_vpls, by_view = r->settings.view_importance && !stable;
-    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy, by_view, stable};
+    uint32_t words[] = {request.count, request.seed, request.subsets, request.glossy, by_view, stable, es_bounce_capacity(&r->settings)};
     es_plan_reads(plan, words, sizeof words);
     if (by_view) es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads(plan, &r->settings.renew, sizeof r->settings.renew);
@@ -279,7 +284,7 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
     uint64_t unsettled = stable && !r->stable.settled ? r->frames + 1 : 0;
     es_plan_reads(plan, &unsettled, sizeof unsettled);
     if (!es_plan_run(plan, ES_PASS_VPLS)) return ES_OK;
-    es_result result = reserve_vpls(r, request.count);
+    es_result result = reserve_vpls(r, es_bounce_capacity(&r->settings));
     es_arena_reset(&r->arena);
     es_receivers* receivers = by_view && !result ? es_arena_allocate(&r->arena, sizeof *receivers) : NULL;
     if (receivers) {
@@ -292,28 +297,35 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
     for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i], receivers);
     if (!result && stable) {
         es_stable_vpl_request of_stable = {request, r->settings.renew, in->list, scene_hash(in), in->revisions.materials};
-        result = es_stable_vpls_update(r->context, &r->stable, r->light_views, r->light_count, r->importances, &of_stable, r->vpls, &r->vpl_count);
+        result = es_stable_vpls_update(r->context, &r->stable, r->light_views, r->light_count, r->importances, &of_stable, r->vpls, &r->first_vpls);
     } else if (!result) es_stable_vpls_free(r->context, &r->stable);
-    if (!result && !stable) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->vpl_count);
-    if (!result) es_plan_done(plan, ES_PASS_VPLS, r->vpl_count);
+    if (!result && !stable) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->first_vpls);
+    if (!result) es_plan_done(plan, ES_PASS_VPLS, r->first_vpls);
     return result;
 }
 
-/* What is closer to a light than this is its own surface: the position comes from a texel's centre and the normal is interpolated, so
- * neighbouring triangles may rise a little above its horizon. */
-static float near_distance(const es_frame_inputs* in) { return in->extent * 2e-3f; }
+float es_near_distance(const es_frame_inputs* in) { return in->extent * 2e-3f; }
 
-static es_result draw_classic_maps(es_renderer* r, const es_frame_inputs* in)
+es_result es_draw_classic_maps(es_renderer* r, const es_frame_inputs* in, uint32_t first, uint32_t end)
 {
     uint32_t size = r->settings.classic_size;
     size_t scratch_floats = es_classic_scratch_floats(size);
     float* scratch = es_allocate_array(r->context, scratch_floats, sizeof *scratch);
     if (!scratch) return es_context_last_result(r->context);
-    es_result result = es_ism_maps_reserve(r->context, &r->maps, size, r->vpl_count, in->extent);
-    for (uint32_t i = 0; i < r->vpl_count && !result; i++)
-        result = es_classic_map_draw(r->rasterizer, in->list, &r->vpls[i], size, near_distance(in), in->extent, scratch, r->maps.texels + (size_t)i * size * size);
+    es_result result = ES_OK;
+    for (uint32_t i = first; i < end && !result; i++)
+        result = es_classic_map_draw(r->rasterizer, in->list, &r->vpls[i], size, es_near_distance(in), in->extent, scratch, r->maps.texels + (size_t)i * size * size);
+    r->maps.count = end;
     es_release(r->context, scratch, scratch_floats * sizeof *scratch);
     return result;
+}
+
+es_result es_draw_imperfect_maps(es_renderer* r, const es_frame_inputs* in, uint32_t first, uint32_t end, uint32_t room)
+{
+    const es_renderer_settings* s = &r->settings;
+    es_ism_job job = {.vpls = r->vpls, .vpl_count = end, .first = first, .room = room, .points = &r->points, .size = s->ism_size, .far_distance = in->extent, .near_distance = es_near_distance(in),
+        .pull_push = s->pull_push, .pull_threshold = s->pull_threshold, .push_threshold = s->push_threshold, .pull_push_levels = s->pull_push_levels, .keep = s->skip, .kept_bytes = (size_t)s->ism_kept << 20};
+    return es_ism_maps_build(r->context, &r->maps, &job);
 }
 
 static uint32_t subset_count(const es_renderer_settings* s)
@@ -327,49 +339,45 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* none = in->no_indirect ? in->no_indirect : r->vpl_count ? NULL : "the lights reach nothing";
-    if (none || s->method != ES_GI_ISM) {
-        const char* why = none ? none : "gi is not ism";
-        es_plan_not_needed(plan, ES_PASS_POINTS, why);
-        es_plan_not_needed(plan, ES_PASS_ISM, why);
-    }
+    const char* none = in->no_indirect ? in->no_indirect : r->first_vpls ? NULL : "the lights reach nothing";
+    const bool points = !none && (s->method == ES_GI_ISM || es_bounce_wants_points(s));
+    if (!points) es_plan_not_needed(plan, ES_PASS_POINTS, none ? none : "gi is not ism");
+    if (none || s->method != ES_GI_ISM) es_plan_not_needed(plan, ES_PASS_ISM, none ? none : "gi is not ism");
     if (none || s->method != ES_GI_CLASSIC) es_plan_not_needed(plan, ES_PASS_CLASSIC, none ? none : "gi is not classic");
-    if (none || s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED) return ES_OK;
-
-    if (s->method == ES_GI_CLASSIC) {
-        es_plan_begin(plan, ES_PASS_CLASSIC);
-        es_plan_reads_pass(plan, ES_PASS_VPLS);
-        es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
-        es_plan_reads(plan, &s->classic_size, sizeof s->classic_size);
-        if (!es_plan_run(plan, ES_PASS_CLASSIC)) return ES_OK;
-        es_result result = draw_classic_maps(r, in);
-        if (!result) es_plan_done(plan, ES_PASS_CLASSIC, r->vpl_count);
-        return result;
-    }
 
     uint32_t subsets = subset_count(s);
     es_plan_begin(plan, ES_PASS_POINTS);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_point_request request = {s->ism_points, subsets, s->ism_detail};
     es_plan_reads(plan, &request, sizeof request);
-    if (es_plan_run(plan, ES_PASS_POINTS)) {
+    if (points && es_plan_run(plan, ES_PASS_POINTS)) {
         uint64_t moved;
         es_result result = es_scene_points_update(r->context, &r->points, in->list, &request, &moved);
         if (result) return result;
         es_plan_done(plan, ES_PASS_POINTS, moved);
     }
+    if (none || (s->method != ES_GI_ISM && s->method != ES_GI_CLASSIC)) return ES_OK;
 
-    es_plan_begin(plan, ES_PASS_ISM);
+    /* room for all bounces: maps of later ones are added while these stand */
+    const uint32_t capacity = es_bounce_room(r);
+    const bool imperfect = s->method == ES_GI_ISM;
+    const es_pass pass = imperfect ? ES_PASS_ISM : ES_PASS_CLASSIC;
+    es_plan_begin(plan, pass);
     es_plan_reads_pass(plan, ES_PASS_VPLS);
-    es_plan_reads_pass(plan, ES_PASS_POINTS);
-    float numbers[] = {(float)s->ism_size, s->pull_push, s->pull_threshold, s->push_threshold, (float)s->pull_push_levels, in->extent};
-    es_plan_reads(plan, numbers, sizeof numbers);
-    if (!es_plan_run(plan, ES_PASS_ISM)) return ES_OK;
-    es_ism_job job = {.vpls = r->vpls, .vpl_count = r->vpl_count, .points = &r->points, .size = s->ism_size, .far_distance = in->extent, .near_distance = near_distance(in),
-        .pull_push = s->pull_push, .pull_threshold = s->pull_threshold, .push_threshold = s->push_threshold, .pull_push_levels = s->pull_push_levels, .keep = s->skip, .kept_bytes = (size_t)s->ism_kept << 20};
-    es_result result = es_ism_maps_build(r->context, &r->maps, &job);
-    if (!result) es_plan_done(plan, ES_PASS_ISM, r->maps.kept.splats);
-    if (!result && !r->maps.kept.splats && r->maps.kept.stood) plan->stats[ES_PASS_ISM].skipped = "neither a light nor a point moved";
+    if (imperfect) {
+        es_plan_reads_pass(plan, ES_PASS_POINTS);
+        float numbers[] = {(float)s->ism_size, s->pull_push, s->pull_threshold, s->push_threshold, (float)s->pull_push_levels, in->extent};
+        es_plan_reads(plan, numbers, sizeof numbers);
+    } else {
+        es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+        es_plan_reads(plan, &s->classic_size, sizeof s->classic_size);
+    }
+    es_plan_reads(plan, &capacity, sizeof capacity);
+    if (!es_plan_run(plan, pass)) return ES_OK;
+    es_result result = imperfect ? es_draw_imperfect_maps(r, in, 0, r->first_vpls, capacity) : es_ism_maps_reserve(r->context, &r->maps, s->classic_size, capacity, in->extent);
+    if (!result && !imperfect) result = es_draw_classic_maps(r, in, 0, r->first_vpls);
+    if (!result) es_plan_done(plan, pass, imperfect ? r->maps.kept.splats : r->first_vpls);
+    if (!result && imperfect && !r->maps.kept.splats && r->maps.kept.stood) plan->stats[pass].skipped = "neither a light nor a point moved";
     return result;
 }
 
@@ -445,6 +453,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = pass_vpls(r, in);
     if (!result) result = pass_maps(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
+    if (!result) result = es_pass_bounces(r, in);
     if (!result) result = pass_direct(r, in);
     if (!result) result = es_pass_shading(r, in);
     if (!result) result = es_pass_compensation(r, in);
@@ -498,7 +507,8 @@ es_result es_renderer_render(es_renderer* renderer, es_world* world)
     if (result) {
         es_plan_invalidate(&renderer->plan); /* a pass may have stopped halfway */
         renderer->complete = false;
-        renderer->vpl_count = renderer->light_count = 0;
+        renderer->vpl_count = renderer->first_vpls = renderer->light_count = 0;
+        renderer->stats.bounce_count = 0;
         return result;
     }
     renderer->complete = true;
@@ -522,9 +532,11 @@ const es_frame_stats* es_renderer_stats(const es_renderer* renderer) { return &r
 
 size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t capacity)
 {
+    uint32_t bounce = 1;
     for (size_t i = 0; i < renderer->vpl_count && i < capacity; i++) {
+        while (i >= es_bounce_end(renderer, bounce)) bounce++;
         const es_vpl_record* v = &renderer->vpls[i];
-        vpls[i] = (es_vpl){{v->position[0], v->position[1], v->position[2]}, {v->normal[0], v->normal[1], v->normal[2]}, {v->flux[0], v->flux[1], v->flux[2]}};
+        vpls[i] = (es_vpl){{v->position[0], v->position[1], v->position[2]}, {v->normal[0], v->normal[1], v->normal[2]}, {v->flux[0], v->flux[1], v->flux[2]}, bounce};
     }
     return renderer->vpl_count;
 }

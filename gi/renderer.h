@@ -13,6 +13,7 @@
 #include "gi/scene_points.h"
 #include "gi/shade.h"
 #include "gi/stable_vpls.h"
+#include "gi/surfels.h"
 #include "gi/vpl_sampling.h"
 #include "platform/context.h"
 
@@ -38,10 +39,14 @@ struct es_renderer {
     uint32_t light_count, light_capacity;
 
     es_vpl_record* vpls;
-    uint32_t vpl_count, vpl_capacity;
+    uint32_t vpl_count, vpl_capacity; /* of all bounces, one after another */
+    uint32_t first_vpls;       /* of the first bounce */
+    es_bounce_stats bounces[ES_MAX_BOUNCES];
     es_stable_vpls stable;     /* places of the lights, with vpl.stable: the only thing that frames leave to later ones but what they need not compute again */
 
     es_scene_points points;
+    es_scene_points bounce_points; /* places of further bounces' lights, when they have points of their own */
+    es_surfels surfels;        /* of these or of `points` */
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */
 
     es_trace_scene trace_scene; /* of traced methods */

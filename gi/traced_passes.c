@@ -9,7 +9,7 @@ es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world*
     es_plan* plan = &r->plan;
     const bool wanted = r->settings.method == ES_GI_VPL_TRACED || r->settings.method == ES_GI_VPL_SAMPLED || r->settings.traced_bias == ES_TRACED_COMPENSATED ||
         (r->settings.near_distance > 0.0f && r->settings.traced_bias == ES_TRACED_BOUNDED);
-    const char* why = !wanted ? "nothing is found by rays" : in->no_indirect ? in->no_indirect : r->vpl_count ? NULL : "the lights reach nothing";
+    const char* why = !wanted ? "nothing is found by rays" : in->no_indirect ? in->no_indirect : r->first_vpls ? NULL : "the lights reach nothing";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_HIERARCHY, why);
         es_trace_scene_free(&r->trace_scene);

@@ -376,6 +376,7 @@ expect 0 bench speed --runs 1 --no-peer --only gbuffer-70k --out figures
 says '^gbuffer-70k +[0-9.]+ ms '
 for file in speed.json speed.csv speed-targets.svg index.html; do [ -s figures/$file ] || fail "no $file"; done
 expect 0 bench frame --runs 1 --no-peer --out figures
+expect 0 bench bounces --quick --only bounce-2-cornell --size 48x32 --spp 2 --threads 2 --out figures
 expect 0 bench scale --quick --only scale-threads --size 64x48 --threads 2 --out figures
 says '^scale-threads +[0-9.]+ x '
 refused '--spp 1' bench error --spp 1

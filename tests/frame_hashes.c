@@ -8,7 +8,7 @@
  * The frames are chosen for what may be skipped in them: `unchanged` follows a frame whose every pass can be kept, `camera`
  * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps;
  * `half-temporal` and `temporal` blend light with that of the frame before, `antialiased` the picture as well;
- * `moving` are the scenes
+ * `bounces`, `one-pass` and `reflective` have three bounces by rays, by maps and by reflective maps after a step; `moving` are the scenes
  * that move by themselves, with the hash of the world's state after a second; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
@@ -388,6 +388,23 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     settings.antialias_samples = 3;
     check(context, es_renderer_configure(renderer, &settings), "smoothing edges by several pictures");
     print_images(context, renderer, world, p->name, "supersampled", folder);
+
+    settings.antialias = ES_ANTIALIAS_NONE;
+    settings.method = ES_GI_VPL_SAMPLED;
+    settings.half_resolution = true;
+    settings.bounce_method = ES_BOUNCE_ONE_PASS;
+    settings.bounces = 3;
+    settings.bounce_vpls = p->vpls / 2;
+    check(context, es_renderer_configure(renderer, &settings), "more bounces");
+    print_images(context, renderer, world, p->name, "bounces", folder);
+    settings.half_resolution = false;
+    settings.method = ES_GI_ISM;
+    check(context, es_renderer_configure(renderer, &settings), "bounces by maps");
+    print_images(context, renderer, world, p->name, "one-pass", folder);
+    settings.bounce_method = ES_BOUNCE_REFLECTIVE;
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    check(context, es_renderer_configure(renderer, &settings), "bounces by reflective maps");
+    print_images(context, renderer, world, p->name, "reflective", folder);
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);

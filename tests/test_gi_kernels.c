@@ -206,7 +206,7 @@ static void test_maps_of_a_ceiling(void** state)
     }
     es_vpl_record lights[LIGHTS];
     for (int i = 0; i < LIGHTS; i++) lights[i] = light_at(es_v3(0.1f * (float)i, 0, 0), es_v3(0, 1, 0), 1, 1, 1);
-    es_ism_job job = {.vpls = lights, .vpl_count = LIGHTS, .points = &points, .size = 128, .far_distance = 6, .near_distance = 0.02f, .pull_push = true, .pull_threshold = 0.05f, .push_threshold = 0.05f, .pull_push_levels = 2};
+    es_ism_job job = {.vpls = lights, .vpl_count = LIGHTS, .room = LIGHTS, .points = &points, .size = 128, .far_distance = 6, .near_distance = 0.02f, .pull_push = true, .pull_threshold = 0.05f, .push_threshold = 0.05f, .pull_push_levels = 2};
     es_ism_maps maps = {0};
     assert_int_equal(es_ism_maps_build(context, &maps, &job), ES_OK);
     assert_int_equal(maps.count, LIGHTS);

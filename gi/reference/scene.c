@@ -31,8 +31,7 @@ static void add_texel(const es_texture_image* image, int32_t x, int32_t y, float
     for (int k = 0; k < 4; k++) rgba[k] += (float)t[k] * (weight * (1.0f / 65535.0f));
 }
 
-/* The finest level: a path's end has no pixel to be filtered for. */
-static void sample_texture(const es_texture_use* use, const float uvs[4], float rgba[4])
+void es_trace_sample_texture(const es_texture_use* use, const float uvs[4], float rgba[4])
 {
     const es_texture_image* image = use->image;
     const float* m = use->matrix;
@@ -151,27 +150,27 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
     if (mesh->uvs) interpolate(mesh->uvs, &c, uvs);
     s->base = es_v3(color[0] * m->base_color[0], color[1] * m->base_color[1], color[2] * m->base_color[2]);
     if (m->base_color_texture.image) {
-        sample_texture(&m->base_color_texture, uvs, texel);
+        es_trace_sample_texture(&m->base_color_texture, uvs, texel);
         s->base = es_v3_mul(s->base, es_v3(texel[0], texel[1], texel[2]));
     }
     s->base = es_v3(es_clampf(s->base.x, 0, 1), es_clampf(s->base.y, 0, 1), es_clampf(s->base.z, 0, 1));
     float metallic = m->metallic, roughness = m->model == ES_SURFACE_PHONG ? m->exponent : m->roughness, specular = m->specular;
     if (m->metallic_roughness_texture.image) {
-        sample_texture(&m->metallic_roughness_texture, uvs, texel);
+        es_trace_sample_texture(&m->metallic_roughness_texture, uvs, texel);
         metallic *= texel[2];
         if (m->model != ES_SURFACE_PHONG) roughness *= texel[1];
     }
     if (m->specular_texture.image) {
-        sample_texture(&m->specular_texture, uvs, texel);
+        es_trace_sample_texture(&m->specular_texture, uvs, texel);
         specular *= texel[3];
     }
     s->emission = es_v3(m->emission[0], m->emission[1], m->emission[2]);
     if (m->emission_texture.image) {
-        sample_texture(&m->emission_texture, uvs, texel);
+        es_trace_sample_texture(&m->emission_texture, uvs, texel);
         s->emission = es_v3_mul(s->emission, es_v3(texel[0], texel[1], texel[2]));
     }
     if (m->normal_texture.image) {
-        sample_texture(&m->normal_texture, uvs, texel);
+        es_trace_sample_texture(&m->normal_texture, uvs, texel);
         normal = map_normal(instance, m, &c, normal, texel);
     }
     s->normal = front ? normal : es_v3_scale(normal, -1.0f);
@@ -202,7 +201,7 @@ bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit)
     }
     if (instance->mesh->uvs) interpolate(instance->mesh->uvs, &c, uvs);
     if (m->base_color_texture.image) {
-        sample_texture(&m->base_color_texture, uvs, texel);
+        es_trace_sample_texture(&m->base_color_texture, uvs, texel);
         alpha *= texel[3];
     }
     return alpha < m->alpha_cutoff;

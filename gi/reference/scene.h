@@ -51,6 +51,9 @@ bool es_trace_blocked(const es_trace_scene* scene, es_ray ray);
 /* Is the alpha mask open there? */
 bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit);
 
+/* At the finest level: a path's end has no pixel to be filtered for. `uvs`: both sets, as vertices have them. */
+void es_trace_sample_texture(const es_texture_use* use, const float uvs[4], float rgba[4]);
+
 /* Radiance of the environment from a direction (unit). */
 es_vec3 es_trace_environment(const es_trace_scene* scene, es_vec3 direction);
 

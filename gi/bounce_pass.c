@@ -1,0 +1,190 @@
+#include "gi/bounce_pass.h"
+
+#include <string.h>
+
+#include "gi/bounces.h"
+#include "gi/classic.h"
+#include "gi/indirect.h"
+#include "gi/passes.h"
+
+/* Sets of points for the senders, together about as many as Knecht's scenes have (§5.1: 32k). */
+enum { POINT_SUBSETS = 128 };
+
+uint32_t es_bounce_capacity(const es_renderer_settings* s) { return s->vpls + (s->bounces > 1 ? (s->bounces - 1) * s->bounce_vpls : 0); }
+
+uint32_t es_bounce_room(const es_renderer* r) { return r->first_vpls + es_bounce_capacity(&r->settings) - r->settings.vpls; }
+
+bool es_bounce_wants_points(const es_renderer_settings* s) { return s->bounces > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_REFLECTIVE; }
+
+uint32_t es_bounce_end(const es_renderer* r, uint32_t bounces)
+{
+    uint32_t end = 0;
+    for (uint32_t b = 0; b < bounces && b < r->stats.bounce_count; b++) end += r->bounces[b].vpls;
+    return end;
+}
+
+static es_result prepare_points(es_renderer* r, const es_frame_inputs* in, const es_scene_points** points)
+{
+    const es_renderer_settings* s = &r->settings;
+    *points = &r->points;
+    if (s->bounce_method == ES_BOUNCE_ONE_PASS) {
+        uint64_t moved;
+        *points = &r->bounce_points;
+        es_result result = es_scene_points_update(r->context, &r->bounce_points, in->list, &(es_point_request){.subset_size = s->bounce_points, .subset_count = POINT_SUBSETS}, &moved);
+        if (result) return result;
+    }
+    return es_surfels_update(r->context, &r->surfels, *points, in->list, in->revisions.materials);
+}
+
+static es_result draw_maps(es_renderer* r, const es_frame_inputs* in, uint32_t first, uint32_t end)
+{
+    if (r->settings.method == ES_GI_ISM) return es_draw_imperfect_maps(r, in, first, end, es_bounce_room(r));
+    return r->settings.method == ES_GI_CLASSIC ? es_draw_classic_maps(r, in, first, end) : ES_OK;
+}
+
+static es_result add_bounce(es_renderer* r, const es_frame_inputs* in, const es_scene_points* points, uint32_t bounce)
+{
+    const es_renderer_settings* s = &r->settings;
+    const bool traced = s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED;
+    const es_bounce_stats* before = &r->bounces[bounce - 2];
+    es_bounce_stats* stats = &r->bounces[bounce - 1];
+    double start = es_seconds();
+    es_bounce_job job = {.method = s->bounce_method, .vpls = r->vpls, .first_sender = r->vpl_count - before->vpls, .sender_count = before->vpls, .first = r->vpl_count, .count = s->bounce_vpls, .bounce = bounce,
+        .seed = s->seed, .subsets = s->interleave * s->interleave, .points = points, .surfels = &r->surfels, .maps = traced ? NULL : &r->maps, .extent = in->extent, .near_distance = es_near_distance(in),
+        .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .lobe_roughness = s->traced_bias == ES_TRACED_UNBOUNDED ? 0.0f : s->lobe_roughness, .glossy = s->glossy_vpls,
+        .size = s->ism_size, .levels = s->pull_push ? s->pull_push_levels : 0, .push_threshold = s->push_threshold};
+    es_vpl_visibility visibility;
+    es_result result = ES_OK;
+    if (traced && s->bounce_method == ES_BOUNCE_ONE_PASS) {
+        es_arena_reset(&r->arena);
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, r->vpls + job.first_sender, job.sender_count, in->extent, &visibility);
+        job.scene = &r->trace_scene;
+        job.ends = visibility.ends;
+    }
+    if (!result) result = es_bounce_lights(r->context, &job);
+    if (result) return result;
+    stats->milliseconds = (es_seconds() - start) * 1e3;
+    stats->vpls = s->bounce_vpls;
+    r->vpl_count += s->bounce_vpls;
+    start = es_seconds();
+    result = draw_maps(r, in, job.first, r->vpl_count);
+    stats->map_milliseconds = traced ? 0.0 : (es_seconds() - start) * 1e3;
+    return result;
+}
+
+static void sum_power(es_renderer* r)
+{
+    uint32_t v = 0;
+    for (uint32_t b = 0; b < r->stats.bounce_count; b++) {
+        es_bounce_stats* stats = &r->bounces[b];
+        for (int k = 0; k < 3; k++) stats->power[k] = 0.0;
+        for (uint32_t end = v + stats->vpls; v < end; v++)
+            for (int k = 0; k < 3; k++) stats->power[k] += (double)r->vpls[v].power[k];
+    }
+}
+
+es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = in->no_indirect ? in->no_indirect : !r->first_vpls ? "the lights reach nothing" : s->bounces < 2 ? "bounces is 1" : !s->bounce_vpls ? "bounce.vpls is 0" : NULL;
+    r->stats.bounces = r->bounces;
+    r->stats.bounce_count = in->no_indirect ? 0 : s->bounces > 1 && !why ? s->bounces : 1;
+    r->bounces[0].vpls = r->first_vpls;
+    if (why) {
+        r->vpl_count = r->first_vpls;
+        es_plan_not_needed(plan, ES_PASS_BOUNCES, why);
+        sum_power(r);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_BOUNCES);
+    const es_pass read[] = {ES_PASS_VPLS, ES_PASS_POINTS, ES_PASS_ISM, ES_PASS_CLASSIC, ES_PASS_HIERARCHY};
+    for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
+    uint32_t words[] = {s->bounces, s->bounce_method, s->bounce_vpls, s->bounce_points, s->method, s->seed, s->interleave, s->glossy_vpls, s->traced_bias, s->ism_size, s->pull_push, s->pull_push_levels, r->first_vpls};
+    es_plan_reads(plan, words, sizeof words);
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->lobe_roughness, s->push_threshold, in->extent};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (es_plan_run(plan, ES_PASS_BOUNCES)) {
+        const es_scene_points* points;
+        r->vpl_count = r->first_vpls;
+        es_result result = prepare_points(r, in, &points);
+        for (uint32_t b = 2; b <= s->bounces && !result; b++) result = add_bounce(r, in, points, b);
+        if (result) return result;
+        es_plan_done(plan, ES_PASS_BOUNCES, r->vpl_count - r->first_vpls);
+    }
+    r->vpl_count = r->first_vpls + (s->bounces - 1) * s->bounce_vpls;
+    sum_power(r);
+    return ES_OK;
+}
+
+/* ---- images of single bounces ------------------------------------------------------------------------------------------------- */
+
+/* Indirect light of the first `bounces` bounces. */
+static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* result)
+{
+    es_result outcome = es_planes_resize(r->context, result, &r->gbuffer);
+    if (outcome || !bounces || !r->plan.valid[ES_PASS_SHADING]) return outcome;
+    es_compose_job job = es_renderer_compose_job(r);
+    es_indirect_planes shaded, whole, filtered[2];
+    memset(&shaded, 0, sizeof shaded);
+    memset(&whole, 0, sizeof whole);
+    memset(filtered, 0, sizeof filtered);
+    if (bounces < r->stats.bounce_count) {
+        es_planes irradiance[2], specular[2];
+        memset(irradiance, 0, sizeof irradiance);
+        memset(specular, 0, sizeof specular);
+        outcome = es_indirect_shade(r, es_bounce_end(r, bounces), &shaded.irradiance, &shaded.specular);
+        if (!outcome) outcome = es_indirect_filter(r, &shaded.irradiance, &shaded.specular, irradiance, specular);
+        for (int i = 0; i < 2; i++) filtered[i] = (es_indirect_planes){irradiance[i], specular[i]};
+        const es_indirect_planes* last = r->filter_passes ? &filtered[(r->filter_passes - 1) % 2] : &shaded;
+        if (!outcome && r->plan.valid[ES_PASS_UPSAMPLE]) {
+            outcome = es_indirect_upsample(r, &last->irradiance, &last->specular, &whole.irradiance, &whole.specular);
+            last = &whole;
+        }
+        for (int k = 0; k < 3; k++) {
+            job.irradiance[k] = last->irradiance.at[k];
+            job.specular[k] = r->has_specular ? last->specular.at[k] : NULL;
+        }
+    }
+    for (int k = 0; k < 3; k++) job.indirect[k] = result->at[k];
+    if (!outcome) es_compose(r->context, &job);
+    es_indirect_planes_free(r->context, &shaded);
+    es_indirect_planes_free(r->context, &whole);
+    for (int i = 0; i < 2; i++) es_indirect_planes_free(r->context, &filtered[i]);
+    return outcome;
+}
+
+/* To a whole multiple of the last place of `whole`: differences of such numbers that are not above it are exact. */
+static float on_grid_of(float whole, float a)
+{
+    uint32_t bits;
+    memcpy(&bits, &whole, sizeof bits);
+    const uint32_t exponent = bits >> 23 & 0xff;
+    const uint64_t power_of_two = (uint64_t)(1023 - 150 + (exponent ? exponent : 1)) << 52;
+    double grid;
+    memcpy(&grid, &power_of_two, sizeof grid);
+    const double magic = 0x1.8p52; /* pushes out the fraction */
+    return (float)((((double)a / grid + magic) - magic) * grid);
+}
+
+es_result es_bounce_image(es_renderer* r, uint32_t bounce, es_image* image)
+{
+    if (bounce > r->stats.bounce_count) return ES_OK; /* black */
+    es_planes whole = {0}, sum = {0}, before = {0};
+    es_result result = first_bounces(r, (uint32_t)r->stats.bounce_count, &whole);
+    if (!result) result = first_bounces(r, bounce, &sum);
+    if (!result) result = first_bounces(r, bounce - 1, &before);
+    for (uint32_t y = 0; y < image->height && !result; y++)
+        for (uint32_t x = 0; x < image->width; x++)
+            for (int k = 0; k < 3; k++) {
+                const size_t at = (size_t)y * r->gbuffer.stride + x;
+                const float w = whole.at[k][at];
+                image->pixels[((size_t)y * image->width + x) * 3 + (size_t)k] = on_grid_of(w, sum.at[k][at]) - on_grid_of(w, before.at[k][at]);
+            }
+    es_planes_free(r->context, &whole);
+    es_planes_free(r->context, &sum);
+    es_planes_free(r->context, &before);
+    return result;
+}
