@@ -121,7 +121,7 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
 
 /* ---- images of single bounces ------------------------------------------------------------------------------------------------- */
 
-/* Indirect light of the first `bounces` bounces. */
+/* Indirect light of the first `bounces` bounces, without that of frames before. */
 static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* result)
 {
     es_result outcome = es_planes_resize(r->context, result, &r->gbuffer);
@@ -131,7 +131,7 @@ static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* resu
     memset(&shaded, 0, sizeof shaded);
     memset(&whole, 0, sizeof whole);
     memset(filtered, 0, sizeof filtered);
-    if (bounces < r->stats.bounce_count) {
+    if (bounces < r->stats.bounce_count || r->plan.valid[ES_PASS_TEMPORAL]) {
         es_planes irradiance[2], specular[2];
         memset(irradiance, 0, sizeof irradiance);
         memset(specular, 0, sizeof specular);

@@ -45,7 +45,8 @@ typedef enum es_antialias {
  * the lights of the bounce before, and both choose at random, with a probability by what is received and reflected, the power divided by it. */
 typedef enum es_bounce_method {
     ES_BOUNCE_ONE_PASS,   /* on one of a few points of the scene that the reflected light's own shadow map says it sees (Knecht §3.6, and what §6.1 asks for) */
-    ES_BOUNCE_REFLECTIVE  /* on a texel of an imperfect reflective shadow map drawn for the reflected light (Ritschel thesis §5.3.1); slower, less noisy */
+    ES_BOUNCE_REFLECTIVE  /* on a texel of an imperfect reflective shadow map drawn for the reflected light (Ritschel thesis §5.3.1); slower, but
+                          * where imperfect maps let light through walls, as in scenes much larger than their walls are thick, it does not pass that on */
 } es_bounce_method;
 
 enum { ES_MAX_BOUNCES = 16 };
@@ -149,7 +150,8 @@ ES_API size_t es_image_name_count(void);
 ES_API const char* es_image_name(size_t index);         /* "display" first: what a window shows */
 ES_API const char* es_image_description(size_t index);
 /* A copy of one image of the last frame as plain floats, made on request; the caller destroys it. IMAGE_UNKNOWN names the nearest.
- * "indirect-1" … "indirect-16" are single bounces, black beyond es_renderer_settings.bounces; their lights are shaded again for it. */
+ * "indirect-1" … "indirect-16" are single bounces, black beyond es_renderer_settings.bounces; their lights are shaded again for it. With `temporal`
+ * they are of this frame's lights alone, and add up to what was blended with the light of frames before. */
 ES_API es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* image);
 /* The displayed image as 0x00RRGGBB, width × height words, top row first; valid until the next call on the renderer. */
 ES_API const uint32_t* es_renderer_display(es_renderer* renderer, uint32_t* width, uint32_t* height);

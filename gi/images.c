@@ -19,7 +19,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_RADIANCE, "radiance", "direct + indirect + emission, W/(m² sr)"},
     {IMAGE_DIRECT, "direct", "reflected direct light, W/(m² sr)"},
     {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
-    {IMAGE_BOUNCE, "indirect-1", "of the indirect light, the first bounce; indirect-2 … indirect-16 likewise; their sum is it to the bit"},
+    {IMAGE_BOUNCE, "indirect-1", "of the indirect light, the first bounce; indirect-2 … indirect-16 likewise; their sum is it to the bit, before history"},
     {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
     {IMAGE_CONFIDENCE, "confidence", "in last frame's indirect light, 0 to 1 (Knecht eq. 3.4)"},

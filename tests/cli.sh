@@ -59,9 +59,9 @@ says '^usage:'
 expect 0 --version
 says '^earthshine [0-9]+\.[0-9]+\.[0-9]+ \('
 expect 0 scenes
-for scene in cornell room hall; do says "^$scene +[^ ]"; done
+for scene in cornell room hall maze; do says "^$scene +[^ ]"; done
 expect 0 scenes --settings
-for scene in cornell room hall; do says "^$scene +[^ ]"; done
+for scene in cornell room hall maze; do says "^$scene +[^ ]"; done
 expect 0 settings
 says '^width +1024 '
 says '^world\.triangles '
