@@ -298,7 +298,7 @@ if play cornell --size 640x480 "${small[@]}"; then
 fi
 
 # ---- bodies: one is taken from the stack; wound back and left alone it stays; all of it is recorded and replayed ---------
-if play cornell-stack --size 640x480 "${small[@]}" --image instance --record stack.rec --set world.speed=0.01; then
+if play cornell-stack --size 640x480 "${small[@]}" --image instance --record stack.rec --set world.speed=0.01 --set antialias=none; then
     key space c # before the ball comes; then at the usual speed, step by step
     shot
     first=$picture
