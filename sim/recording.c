@@ -6,7 +6,7 @@
 #include "sim/recording.h"
 
 /* What a difference is looked for in: causes before what they cause. */
-static const es_object_kind compared[] = {ES_OBJECT_BODY, ES_OBJECT_JOINT, ES_OBJECT_CLIP, ES_OBJECT_MOVER, ES_OBJECT_NODE, ES_OBJECT_LIGHT, ES_OBJECT_CAMERA, ES_OBJECT_INSTANCE, ES_OBJECT_MESH};
+static const es_object_kind compared[] = {ES_OBJECT_BODY, ES_OBJECT_JOINT, ES_OBJECT_SOFT, ES_OBJECT_CLIP, ES_OBJECT_MOVER, ES_OBJECT_NODE, ES_OBJECT_LIGHT, ES_OBJECT_CAMERA, ES_OBJECT_INSTANCE, ES_OBJECT_MESH};
 enum { COMPARED = sizeof compared / sizeof compared[0] };
 
 /* ---- inputs ---------------------------------------------------------------------------------------------------------- */
@@ -106,6 +106,27 @@ static void visit_settings(state_io* io, es_world_settings* s)
     visit_vector(io, &s->gravity);
 }
 
+/* What es_world_set_soft takes, and what it looks at besides. */
+static void visit_soft(state_io* io, es_soft_desc* d)
+{
+    visit_floats(io, &d->mass, 1);
+    visit_floats(io, &d->stretch_compliance, 1);
+    visit_floats(io, &d->shear_compliance, 1);
+    visit_floats(io, &d->bend_compliance, 1);
+    visit_floats(io, &d->volume_compliance, 1);
+    visit_floats(io, &d->damping, 1);
+    visit_floats(io, &d->thickness, 1);
+    visit_floats(io, &d->friction, 1);
+    visit_floats(io, &d->drag, 1);
+    visit_vector(io, &d->wind);
+    visit_floats(io, &d->pressure, 1);
+    visit_floats(io, &d->gravity_scale, 1);
+    visit_flag(io, &d->self_collision);
+    visit_floats(io, &d->tear_stretch, 1);
+    visit_flag(io, &d->tearable);
+    visit_u32(io, &d->substeps);
+}
+
 /* Bytes of a state are not copied: written from where they are, read where they lie. */
 static void visit_state(state_io* io, es_input* in)
 {
@@ -175,6 +196,28 @@ static void visit_input(state_io* io, es_input* in)
         visit_floats(io, &in->number, 1);
         break;
     case ES_INPUT_MOVE_HAND: visit_position(io, in->place); break;
+    case ES_INPUT_SOFT: visit_soft(io, &in->soft); break;
+    case ES_INPUT_SOFT_ATTACH:
+        visit_u32(io, &in->attachment.vertex);
+        visit_u32(io, &in->attachment.node.id);
+        visit_u32(io, &in->attachment.body.id);
+        visit_flag(io, &in->attachment.in_place);
+        visit_vector(io, &in->attachment.local);
+        break;
+    case ES_INPUT_SOFT_DETACH: visit_u32(io, &in->vertex); break;
+    case ES_INPUT_SOFT_TEAR:
+        visit_position(io, in->place);
+        visit_floats(io, &in->number, 1);
+        break;
+    case ES_INPUT_SOFT_IMPULSE:
+        visit_u32(io, &in->vertex);
+        visit_vector(io, &in->a);
+        break;
+    case ES_INPUT_GRAB_SOFT:
+        visit_u32(io, &in->other);
+        visit_u32(io, &in->vertex);
+        visit_position(io, in->place);
+        break;
     default: break;
     }
 }
@@ -253,6 +296,13 @@ static es_result apply(es_world* world, const es_input* in)
     case ES_INPUT_JOINT: return es_world_set_joint(world, (es_joint){in->id}, &in->joint);
     case ES_INPUT_GRAB_BODY: return es_world_grab_body(world, in->id, (es_body){in->other}, in->a, in->place, in->number);
     case ES_INPUT_MOVE_HAND: return es_world_move_hand(world, in->id, in->place);
+    case ES_INPUT_SOFT: return es_world_set_soft(world, (es_soft){in->id}, &in->soft);
+    case ES_INPUT_SOFT_ATTACH: return es_world_soft_attach(world, (es_soft){in->id}, &in->attachment);
+    case ES_INPUT_SOFT_DETACH: return es_world_soft_detach(world, (es_soft){in->id}, in->vertex);
+    case ES_INPUT_SOFT_TEAR: return es_world_soft_tear(world, (es_soft){in->id}, in->place, in->number);
+    case ES_INPUT_SOFT_IMPULSE: return es_world_soft_impulse(world, (es_soft){in->id}, in->vertex, in->a);
+    case ES_INPUT_SOFT_WAKE: return es_world_wake_soft(world, (es_soft){in->id});
+    case ES_INPUT_GRAB_SOFT: return es_world_grab_soft(world, in->id, (es_soft){in->other}, in->vertex, in->place);
     default: return es_world_release(world, in->id);
     }
 }

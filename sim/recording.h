@@ -28,13 +28,21 @@ typedef enum es_input_type {
     ES_INPUT_GRAB_BODY,
     ES_INPUT_MOVE_HAND,
     ES_INPUT_RELEASE,
+    ES_INPUT_SOFT,
+    ES_INPUT_SOFT_ATTACH,
+    ES_INPUT_SOFT_DETACH,
+    ES_INPUT_SOFT_TEAR,       /* number: the radius */
+    ES_INPUT_SOFT_IMPULSE,
+    ES_INPUT_SOFT_WAKE,
+    ES_INPUT_GRAB_SOFT,
     ES_INPUT_TYPES
 } es_input_type;
 
 typedef struct es_input {
     es_input_type type;
     uint32_t id;              /* the object's handle, or the hand */
-    uint32_t other;           /* GRAB_BODY: the body */
+    uint32_t other;           /* GRAB_BODY: the body; GRAB_SOFT: the soft body */
+    uint32_t vertex;          /* of a soft body, or ES_SOFT_ALL */
     bool flag;                /* CLIP: plays; IMPULSE, FORCE: `place` was given */
     double place[3];
     es_vec3 a, b;
@@ -49,6 +57,8 @@ typedef struct es_input {
         es_joint_desc joint;
         es_world_settings settings;
         es_quat rotation;
+        es_soft_desc soft;    /* its numbers */
+        es_soft_attachment attachment;
         struct { const void* bytes; size_t size; } state;
     };
 } es_input;

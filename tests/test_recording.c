@@ -17,7 +17,7 @@
 
 enum { BODIES = 12, STEPS = 90 };
 
-typedef struct scene { es_context* context; es_world* world; es_body bodies[BODIES]; es_node lamp_node; es_light lamp; es_mover mover; es_camera camera; } scene;
+typedef struct scene { es_context* context; es_world* world; es_body bodies[BODIES]; es_node lamp_node; es_light lamp; es_mover mover; es_soft cloth; es_camera camera; } scene;
 
 static void no_log(void* user, es_log_level level, es_result item, const char* message) { (void)user, (void)level, (void)item, (void)message; }
 
@@ -62,6 +62,29 @@ static scene open_scene(void)
     orbit.node = s.lamp_node;
     orbit.arm = es_v3(1, 2, 0);
     assert_int_equal(es_world_add_mover(s.world, &orbit, &s.mover), ES_OK);
+    enum { SIDE = 9 };
+    float places[SIDE * SIDE * 3];
+    uint32_t triangles[(SIDE - 1) * (SIDE - 1) * 6], *index = triangles;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        places[3 * i] = 2 + 0.1f * (float)(i % SIDE);
+        places[3 * i + 1] = 2;
+        places[3 * i + 2] = 0.1f * (float)(i / SIDE);
+    }
+    for (uint32_t j = 0; j + 1 < SIDE; j++)
+        for (uint32_t i = 0; i + 1 < SIDE; i++) {
+            const uint32_t corner = SIDE * j + i, quad[6] = {corner, corner + 1, corner + SIDE, corner + 1, corner + SIDE + 1, corner + SIDE};
+            for (int k = 0; k < 6; k++) *index++ = quad[k];
+        }
+    es_mesh mesh;
+    es_mesh_desc sheet = {.name = "sheet", .vertex_count = SIDE * SIDE, .triangle_count = (SIDE - 1) * (SIDE - 1) * 2, .positions = places, .indices = triangles};
+    assert_int_equal(es_world_add_mesh(s.world, &sheet, &mesh), ES_OK);
+    es_soft_desc cloth = es_default_soft_desc();
+    cloth.mesh = mesh;
+    cloth.tearable = true;
+    es_soft_attachment corner = {.vertex = 0, .in_place = true};
+    cloth.attachments = &corner;
+    cloth.attachment_count = 1;
+    assert_int_equal(es_world_add_soft(s.world, &cloth, &s.cloth), ES_OK);
     es_camera_desc lens = es_default_camera_desc();
     assert_int_equal(es_world_add_camera(s.world, &lens, &s.camera), ES_OK);
     return s;
@@ -104,6 +127,23 @@ static void play(scene* s, int step, char** rewound, size_t* rewound_size)
         es_world_set_body_pose(s->world, s->bodies[0], (const double[3]){-2, 1, 0}, es_quat_identity());
         es_world_set_body_velocity(s->world, s->bodies[0], es_v3(3, 0, 0), es_v3(0, 1, 0));
     }
+    if (step == 5) assert_int_equal(es_world_grab_soft(s->world, 1, s->cloth, 80, (const double[3]){2.5, 2.5, 1}), ES_OK);
+    if (step == 14) assert_int_equal(es_world_release(s->world, 1), ES_OK);
+    if (step == 16) assert_int_equal(es_world_soft_attach(s->world, s->cloth, &(es_soft_attachment){.vertex = 8, .body = s->bodies[9], .in_place = true}), ES_OK);
+    if (step == 22) {
+        es_soft_desc cloth;
+        assert_int_equal(es_world_get_soft(s->world, s->cloth, &cloth), ES_OK);
+        cloth.wind = es_v3(0, 0, 5);
+        assert_int_equal(es_world_set_soft(s->world, s->cloth, &cloth), ES_OK);
+        assert_int_equal(es_world_soft_impulse(s->world, s->cloth, ES_SOFT_ALL, es_v3(0.1f, 0, 0)), ES_OK);
+    }
+    if (step == 35) {
+        double middle[3];
+        assert_int_equal(es_world_get_soft_vertex(s->world, s->cloth, 40, middle, NULL), ES_OK);
+        assert_int_equal(es_world_soft_tear(s->world, s->cloth, middle, 0.12f), ES_OK);
+    }
+    if (step == 45) assert_int_equal(es_world_soft_detach(s->world, s->cloth, 0), ES_OK);
+    if (step == 50) assert_int_equal(es_world_wake_soft(s->world, s->cloth), ES_OK);
     if (step == 25) {
         assert_int_equal(es_world_save(s->world, NULL, rewound_size), ES_OK);
         *rewound = malloc(*rewound_size);

@@ -1,5 +1,6 @@
 /* Cloth and soft bodies as objects of the world: made, changed, held, destroyed. */
 #include "sim/soft/soft.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -241,6 +242,7 @@ es_result es_world_set_soft(es_world* world, es_soft handle, const es_soft_desc*
     es_soft_take_numbers(now, desc);
     es_soft_set_compliances(soft);
     es_soft_wake(soft);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT, .id = handle.id, .soft = *desc});
     return !reach || es_soft_make_anchors(world->context, soft) ? ES_OK : es_context_last_result(world->context);
 }
 
@@ -273,6 +275,7 @@ es_result es_world_soft_attach(es_world* world, es_soft handle, const es_soft_at
     if (result == ES_OK && !es_soft_make_anchors(world->context, soft)) result = es_context_last_result(world->context);
     es_fp_leave(environment);
     es_soft_wake(soft);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_ATTACH, .id = handle.id, .attachment = *attachment});
     return result;
 }
 
@@ -288,6 +291,7 @@ es_result es_world_soft_detach(es_world* world, es_soft handle, uint32_t vertex)
         else soft->holds[kept++] = soft->holds[i];
     }
     if (kept == soft->hold_count) return ES_OK;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_DETACH, .id = handle.id, .vertex = vertex});
     soft->hold_count = kept;
     es_fp_environment environment = es_fp_enter();
     bool good = es_soft_make_anchors(world->context, soft);
@@ -302,6 +306,7 @@ es_result es_world_wake_soft(es_world* world, es_soft handle)
     es_soft_object* soft = object_of(world, handle);
     if (!soft) return ES_STALE_HANDLE;
     es_soft_wake(soft);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_WAKE, .id = handle.id});
     return ES_OK;
 }
 
@@ -322,6 +327,7 @@ es_result es_world_soft_impulse(es_world* world, es_soft handle, uint32_t vertex
         for (int k = 0; k < 3; k++) v[k] = es_clampf((float)((double)v[k] + (double)by[k] / mass), -ES_SOFT_SPEED, ES_SOFT_SPEED);
     }
     es_soft_wake(soft);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_IMPULSE, .id = handle.id, .vertex = vertex, .a = impulse});
     return ES_OK;
 }
 
@@ -351,5 +357,6 @@ es_result es_world_grab_soft(es_world* world, uint32_t hand, es_soft handle, uin
     es_world_release(world, hand);
     world->hands[hand] = (es_hand_state){.soft = handle.id, .vertex = vertex, .target = {target[0], target[1], target[2]}};
     es_soft_wake(soft);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_GRAB_SOFT, .id = hand, .other = handle.id, .vertex = vertex, .place = {target[0], target[1], target[2]}});
     return ES_OK;
 }

@@ -3,6 +3,7 @@
  * An edge that is too long pulls two particles apart; the crack goes through one of them, at right angles to the edge. Where that
  * parts nothing (a corner, a strip of one triangle) or nothing is left in reserve, the edge's triangles vanish. */
 #include "sim/soft/soft.h"
+#include "sim/recording.h"
 
 #include <string.h>
 
@@ -227,6 +228,7 @@ es_result es_world_soft_tear(es_world* world, es_soft soft_handle, const double 
     bool good = tear_edges(world, soft, edges, count);
     es_fp_leave(environment);
     es_release(world->context, edges, most * sizeof *edges);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_TEAR, .id = soft_handle.id, .place = {point[0], point[1], point[2]}, .number = radius});
     return good ? ES_OK : es_context_last_result(world->context);
 }
 
