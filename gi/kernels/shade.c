@@ -120,8 +120,10 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
 
 enum shadow { NO_SHADOW, SHADOW_BY_MAP, SHADOW_BY_RAYS };
 
-/* The three switches are constants at every call. */
-VINL void apply_light(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, enum shadow shadow, bool glossy_light, bool lobes)
+enum which { ALL_PIXELS, PIXELS_WITH_LOBES };
+
+/* The four switches are constants at every call. */
+VINL void apply_light(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, enum shadow shadow, bool glossy_light, bool lobes, enum which which)
 {
     const vf zero = vf_zero(), one = vf_set1(1.0f);
     const vf ox = vf_set1(light->position[0]), oy = vf_set1(light->position[1]), oz = vf_set1(light->position[2]);
@@ -136,6 +138,7 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
     const vi size = vi_set1((int32_t)job->map_size);
 
     for (uint32_t i = 0; i < lanes; i += VW) {
+        if (which == PIXELS_WITH_LOBES && !batch->lobed[i / VW]) continue;
         vf dx = vf_load(batch->px + i) - ox, dy = vf_load(batch->py + i) - oy, dz = vf_load(batch->pz + i) - oz;
         vf qz = dx * nx + dy * ny + dz * nz;
         vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i); /* times -r */
@@ -191,7 +194,7 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
  * loop the chain of square root, division, look-up and comparison is longer than what a processor keeps in flight. */
 enum { STRETCH = 512 };
 
-VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, const uint16_t* next_map, es_shade_batch* batch, uint32_t lanes, bool shadowed)
+VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, const uint16_t* next_map, es_shade_batch* batch, uint32_t lanes, bool shadowed, bool but_lobes)
 {
     const vf zero = vf_zero();
     const vf ox = vf_set1(light->position[0]), oy = vf_set1(light->position[1]), oz = vf_set1(light->position[2]);
@@ -219,7 +222,7 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
             vf qz = dx * nx + dy * ny + dz * nz;
             vf pixel_cos = dx * vf_load(batch->nx + i) + dy * vf_load(batch->ny + i) + dz * vf_load(batch->nz + i); /* times -r */
             listed[count] = i;
-            count += vm_any(vm_gt(qz, zero) & vm_lt(pixel_cos, zero));
+            count += vm_any(vm_gt(qz, zero) & vm_lt(pixel_cos, zero)) && !(but_lobes && batch->lobed[i / VW]);
         }
         for (uint32_t k = 0; k < count; k++) {
             const uint32_t i = listed[k];
@@ -362,10 +365,10 @@ static void apply_chosen(const es_shade_job* job, const es_shade_light* lights, 
 static void apply_traced(const es_shade_job* job, const es_shade_light* light, uint32_t vpl, es_shade_batch* batch, uint32_t lanes, bool lobes)
 {
     job->visibility->test(job->visibility, vpl, batch, lanes);
-    if (lobes && light->glossy) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true, true);
-    else if (lobes) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false, true);
-    else if (light->glossy) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true, false);
-    else apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false, false);
+    if (lobes && light->glossy) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true, true, ALL_PIXELS);
+    else if (lobes) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false, true, ALL_PIXELS);
+    else if (light->glossy) apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true, false, ALL_PIXELS);
+    else apply_light(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false, false, ALL_PIXELS);
 }
 
 static void scatter(const es_gbuffer* g, const lanes_of_phase* p, uint32_t n, float (*from)[ES_SHADE_LANES], float* const to[3])
@@ -412,11 +415,12 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
         const enum shadow shadow = map ? SHADOW_BY_MAP : NO_SHADOW;
         if (job->visibility) apply_traced(job, light, v, batch, lanes, lobes);
-        else if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, true);
-        else if (lobes) apply_light(job, light, map, batch, lanes, shadow, false, true);
-        else if (light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, false);
-        else if (map) apply_diffuse(job, light, map, v + n * n < lit ? map + n * n * map_texels : map, batch, lanes, true);
-        else apply_diffuse(job, light, NULL, NULL, batch, lanes, false);
+        else if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, true, ALL_PIXELS);
+        else if (light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, false, ALL_PIXELS);
+        else if (map) apply_diffuse(job, light, map, v + n * n < lit ? map + n * n * map_texels : map, batch, lanes, true, lobes);
+        else apply_diffuse(job, light, NULL, NULL, batch, lanes, false, lobes);
+        /* a batch has few pixels with lobes, if any: they are apart, so that the others keep their short loops */
+        if (lobes && !job->visibility && !light->glossy) apply_light(job, light, map, batch, lanes, shadow, false, true, PIXELS_WITH_LOBES);
     }
     if (job->near) job->near->add(job->near, batch, lanes, lobes);
     scatter(job->gbuffer, p, n, batch->e, job->irradiance);
