@@ -694,8 +694,8 @@ ES_API const char* es_recording_settings(const es_recording* recording);
 typedef struct es_divergence {
     bool differs;
     uint32_t step;            /* counted from 0 */
-    es_object_kind kind;      /* of the first object that differs, causes before consequences: bodies, joints, clips, movers, nodes, … ES_OBJECT_KINDS:
-                               * none does (time or settings do), or there are other objects than there were */
+    es_object_kind kind;      /* of the first object that differs, causes before consequences: bodies, joints, cloth, clips, movers, nodes, … */
+                              /* ES_OBJECT_KINDS: none does (time or settings do), or there are other objects than there were */
     uint32_t id;              /* its handle */
 } es_divergence;
 /* Puts the world, opened as the recorded one was, into the recording's first state. WRONG_STATE when its content is another. */
