@@ -81,6 +81,35 @@ VINL void fields(const es_solver_job* job, vi index, size_t offset, vf* a, vf* b
     vf_gather4((const char*)job->manifolds + offset, sizeof(es_contact_manifold), index, a, b, c, d);
 }
 
+/* What bears something heavier acts on it as if it had more mass itself: the geometric mean of both. Else an impulse would pass to what is below
+ * in steps as small as the light body's share, and the heavy one would have sunk in long before their sum holds it. With that mean a light body
+ * moving up gives a heavy one at rest no more energy than it had; what bounces back of it, by restitution e, has its share.
+ *
+ * The factor of the inverse mass of a body under one of inverse mass `over`; above: how much the other is above it, cosine. */
+VINL vf bearing(vf inverse, vf over, vf above, vf e)
+{
+    const vf one = vf_set1(1.0f), zero = vf_zero();
+    vm both = vm_gt(over, zero) & vm_gt(inverse, over) & vm_gt(above, zero);
+    vf ratio = vf_select(both, inverse, one) / vf_select(both, over, one), more = vf_max(vf_sqrt(ratio * vf_max(one - e, zero) / (one + e)), one);
+    return one / (one + vf_and(both, vf_min(above, one) * (more - one)));
+}
+
+VINL inertia lighter(inertia i, vf s) { return (inertia){i.xx * s, i.yy * s, i.zz * s, i.xy * s, i.xz * s, i.yz * s}; }
+
+/* Against what does not give way the spring is twice as stiff. One that bears far more than its bodies' own weight is damped more, or what it bears
+ * would swing. burden: m/s, of the last substep's impulses. */
+VINL void soften(const es_solver_job* job, es_wide_contact* c, vf burden)
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f);
+    const vm firm = vm_eq(vf_load(c->mass_a), zero) | vm_eq(vf_load(c->mass_b), zero);
+    const vf share = vf_clamp(burden * vf_set1(job->burden_scale) - one, zero, one);
+    float* const to[3] = {c->bias_rate, c->mass_scale, c->impulse_scale};
+    for (int k = 0; k < 3; k++) {
+        const vf usual = vf_select(firm, vf_set1(job->soft[1][k]), vf_set1(job->soft[0][k])), damped = vf_select(firm, vf_set1(job->soft[3][k]), vf_set1(job->soft[2][k]));
+        vf_store(to[k], usual + share * (damped - usual));
+    }
+}
+
 VINL void prepare(const es_solver_job* job, es_wide_contact* c)
 {
     const vf zero = vf_zero();
@@ -89,6 +118,7 @@ VINL void prepare(const es_solver_job* job, es_wide_contact* c)
     motion ma = gather(job->bodies.velocity, a), mb = gather(job->bodies.velocity, b);
     vf mass_a, mass_b;
     inertia ia = load_inertia(job->bodies.mass, a, &mass_a), ib = load_inertia(job->bodies.mass, b, &mass_b);
+    const vf rolling_inertia = ia.xx + ia.yy + ia.zz + ib.xx + ib.yy + ib.zz;
     v3 n, apart, friction, roll;
     vf unused, twist, count_bits, mean;
     fields(job, manifold, offsetof(es_contact_manifold, geometry.normal), &n.x, &n.y, &n.z, &unused);
@@ -96,16 +126,17 @@ VINL void prepare(const es_solver_job* job, es_wide_contact* c)
     fields(job, manifold, offsetof(es_contact_manifold, friction), &friction.x, &friction.y, &friction.z, &twist);
     fields(job, manifold, offsetof(es_contact_manifold, rolling), &roll.x, &roll.y, &roll.z, &unused);
     const vi count = vi_select(used, (vi)count_bits, vi_zero());
+    const vf above = dot(n, (v3){vf_set1(job->up[0]), vf_set1(job->up[1]), vf_set1(job->up[2])}); /* B over A */
+    const vf restitution = vf_load(c->restitution), scale_a = bearing(mass_a, mass_b, above, restitution), scale_b = bearing(mass_b, mass_a, vf_neg(above), restitution);
+    ia = lighter(ia, scale_a);
+    ib = lighter(ib, scale_b);
+    mass_a = mass_a * scale_a;
+    mass_b = mass_b * scale_b;
     mean = inverse_or_zero(vf_from_int(count));
     vf_store(c->mass_a, mass_a);
     vf_store(c->mass_b, mass_b);
     store3(&c->normal, n);
-    /* against what does not give way the spring is twice as stiff */
-    vm firm = vm_eq(mass_a, zero) | vm_eq(mass_b, zero);
-    vf_store(c->bias_rate, vf_select(firm, vf_set1(job->soft[1][0]), vf_set1(job->soft[0][0])));
-    vf_store(c->mass_scale, vf_select(firm, vf_set1(job->soft[1][1]), vf_set1(job->soft[0][1])));
-    vf_store(c->impulse_scale, vf_select(firm, vf_set1(job->soft[1][2]), vf_set1(job->soft[0][2])));
-
+    vf burden = zero;
     v3 middle = {zero, zero, zero}, places[ES_MANIFOLD_POINTS];
     for (uint32_t k = 0; k < c->point_count; k++) {
         es_wide_point* p = &c->points[k];
@@ -128,10 +159,13 @@ VINL void prepare(const es_solver_job* job, es_wide_contact* c)
         vf_store(p->separation, vf_and(there, separation));
         vf_store(p->mass, vf_and(there, inverse_or_zero(k_normal)));
         vf_store(p->impulse, vf_and(there, impulse));
+        burden = burden + vf_and(there, impulse) * k_normal;
         vf_store(p->peak, zero);
         vf approach = dot(n, sub(mb.v, ma.v)) + dot(arm_b, mb.w) - dot(arm_a, ma.w);
         vf_store(p->approach, vf_and(there, approach));
     }
+    soften(job, c, vf_abs(burden));
+
     middle = scale(middle, mean);
     vf radius = zero;
     for (uint32_t k = 0; k < c->point_count; k++) {
@@ -169,7 +203,7 @@ VINL void prepare(const es_solver_job* job, es_wide_contact* c)
     vf_store(c->twist, vf_and(used, twist));
     store3(&c->roll, (v3){vf_and(used, roll.x), vf_and(used, roll.y), vf_and(used, roll.z)});
     /* the trace is at least the largest of the three: a little soft, never too much */
-    vf_store(c->roll_mass, vf_and(used, inverse_or_zero(ia.xx + ia.yy + ia.zz + ib.xx + ib.yy + ib.zz)));
+    vf_store(c->roll_mass, vf_and(used, inverse_or_zero(rolling_inertia)));
 }
 
 void ES_KERNEL(es_sim_contacts_prepare)(const es_solver_job* job, uint32_t begin, uint32_t end)

@@ -9,7 +9,7 @@
 #include "sim/rigid/crew.h"
 #include "sim/rigid/joints.h"
 
-enum { RECORD_GRAIN = 64, CONTACT_GRAIN = 4, CONTACT_HERTZ = 30, CONTACT_DAMPING = 4 };
+enum { RECORD_GRAIN = 64, CONTACT_GRAIN = 4, CONTACT_HERTZ = 30, CONTACT_DAMPING = 1, BURDEN_DAMPING = 4, BURDEN = 60 };
 
 typedef enum stage_kind { LOAD, PREPARE, PREPARE_JOINTS, ACCELERATE, WARM_JOINTS, WARM, SOLVE_JOINTS, SOLVE, MOVE, RELAX_JOINTS, RELAX, BOUNCE, STORE_JOINTS, STORE, UNLOAD } stage_kind;
 
@@ -343,9 +343,15 @@ bool es_solve(es_world* world, float h, uint32_t substeps)
     job->h = h / (float)substeps;
     job->inverse_h = 1.0f / job->h;
     job->max_turn = 0.25f * ES_PI;
+    es_vec3 gravity = world->settings.gravity;
+    float pull = es_v3_length(gravity);
+    for (int k = 0; k < 3; k++) job->up[k] = pull > 1e-6f ? -(&gravity.x)[k] / pull : 0;
     float hertz = es_minf((float)CONTACT_HERTZ, 0.25f * job->inverse_h);
-    soften(job->h, hertz, (float)CONTACT_DAMPING, job->soft[0]);
-    soften(job->h, 2.0f * hertz, (float)CONTACT_DAMPING, job->soft[1]);
+    for (int k = 0; k < 2; k++) {
+        soften(job->h, (float)(k + 1) * hertz, (float)CONTACT_DAMPING, job->soft[k]);
+        soften(job->h, (float)(k + 1) * hertz, (float)BURDEN_DAMPING, job->soft[2 + k]);
+    }
+    job->burden_scale = pull > 1e-6f ? 1.0f / ((float)BURDEN * pull * job->h) : 0;
     plan(solver, substeps);
     es_crew_run(world->context, solver->stages, solver->stage_count, run_block, solver);
     return true;

@@ -10,6 +10,9 @@
  *
  * Friction acts on the manifold as a whole: two directions at the middle of its points, and a twist about the normal.
  *
+ * A contact that bears many times what its lighter body weighs (sixty times as much: from there to twice that) is damped more, and a body
+ * under a heavier one acts on it with more mass than it has (sim/kernels/rigid_contacts.c): so 1000 : 1 stands.
+ *
  * Contacts of one colour share no dynamic body, so that they may be solved at once: in the lanes of a vector and by several threads. */
 #ifndef EARTHSHINE_SIM_RIGID_SOLVER_H
 #define EARTHSHINE_SIM_RIGID_SOLVER_H
@@ -67,7 +70,9 @@ typedef struct es_solver_job {
     const es_contact* list;
     float h, inverse_h;       /* of a substep */
     float max_turn;           /* radians per substep */
-    float soft[2][3];         /* bias rate, mass scale, impulse scale: between dynamic bodies, against others */
+    float up[3];              /* against gravity, unit; 0 without */
+    float soft[4][3];         /* bias rate, mass scale, impulse scale: between dynamic bodies, against others; both under a burden */
+    float burden_scale;       /* s/m: 1 / speed; burdens between that speed and twice it are damped more and more */
 } es_solver_job;
 
 #endif
