@@ -194,9 +194,9 @@ int demo_scenes(int count, char** arguments)
     if (expect_nothing("scenes", count - settings, arguments + settings) != DEMO_OK) return DEMO_BAD_INPUT;
     for (size_t i = 0; i < es_scene_count(); i++) {
         const char* name = es_scene_name(i);
-        printf("%-12s %s\n", name, es_scene_description(i));
+        printf("%-15s %s\n", name, es_scene_description(i));
         if (!settings) continue;
-        for (const char* const* text = es_scene_settings(name); *text; text++) printf("%-12s --set %s\n", "", *text);
+        for (const char* const* text = es_scene_settings(name); *text; text++) printf("%-15s --set %s\n", "", *text);
     }
     return DEMO_OK;
 }
