@@ -43,6 +43,7 @@ static const benchmark benchmarks[] = {
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},
     {"moving", bench_moving, bench_moving_rows, false},
+    {"scenes", bench_scenes, bench_scenes_rows, false},
     {"time", bench_time, bench_time_rows, false},
     {"rays", bench_rays, bench_rays_rows, false},
     {"dynamics", bench_dynamics, bench_dynamics_rows, false},

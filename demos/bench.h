@@ -142,6 +142,9 @@ size_t bench_scale_rows(bench_row* rows, size_t capacity);
 /* bench_dynamics.c, bench_cloth.c */
 int bench_dynamics(const bench_options* options);
 size_t bench_dynamics_rows(bench_row* rows, size_t capacity);
+/* bench_scenes.c */
+int bench_scenes(const bench_options* options);
+size_t bench_scenes_rows(bench_row* rows, size_t capacity);
 /* bench_time.c */
 int bench_time(const bench_options* options);
 size_t bench_time_rows(bench_row* rows, size_t capacity);

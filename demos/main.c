@@ -39,7 +39,7 @@ static const char usage[] =
     "             --map absolute|relative|signed|flip|hdr-flip    what --diff shows\n"
     "             --display-referred --threads N        0 … 1 as displayed, not radiance; all threads unless said\n"
     "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), error, ledger, bounces, scale, frame, moving,\n"
-    "                                                   rays, dynamics, all;\n"
+    "                                                   scenes, time, rays, dynamics, all;\n"
     "                                                   tables, JSON, CSV, SVG and one page, DIR/index.html\n"
     "             --threads N (2) --runs N (5) --only ROW --no-peer --quick\n"
     "             --scene NAME|FILE … --size WxH --spp N    what error and ledger look at, samples of their truths\n"
