@@ -16,6 +16,11 @@ uint32_t es_bounce_room(const es_renderer* r) { return r->first_vpls + es_bounce
 
 bool es_bounce_wants_points(const es_renderer_settings* s) { return s->bounces > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_REFLECTIVE; }
 
+bool es_bounce_wants_rays(const es_renderer_settings* s)
+{
+    return s->bounces > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_ONE_PASS && s->bounce_rays && (s->method == ES_GI_ISM || s->method == ES_GI_CLASSIC);
+}
+
 uint32_t es_bounce_end(const es_renderer* r, uint32_t bounces)
 {
     uint32_t end = 0;
@@ -51,11 +56,11 @@ static es_result add_bounce(es_renderer* r, const es_frame_inputs* in, const es_
     double start = es_seconds();
     es_bounce_job job = {.method = s->bounce_method, .vpls = r->vpls, .first_sender = r->vpl_count - before->vpls, .sender_count = before->vpls, .first = r->vpl_count, .count = s->bounce_vpls, .bounce = bounce,
         .seed = s->seed, .subsets = s->interleave * s->interleave, .points = points, .surfels = &r->surfels, .maps = traced ? NULL : &r->maps, .extent = in->extent, .near_distance = es_near_distance(in),
-        .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .lobe_roughness = s->traced_bias == ES_TRACED_UNBOUNDED ? 0.0f : s->lobe_roughness, .glossy = s->glossy_vpls,
+        .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .rays = s->bounce_rays, .lobe_roughness = s->traced_bias == ES_TRACED_UNBOUNDED ? 0.0f : s->lobe_roughness, .glossy = s->glossy_vpls,
         .size = s->ism_size, .levels = s->pull_push ? s->pull_push_levels : 0, .push_threshold = s->push_threshold};
     es_vpl_visibility visibility;
     es_result result = ES_OK;
-    if (traced && s->bounce_method == ES_BOUNCE_ONE_PASS) {
+    if ((traced && s->bounce_method == ES_BOUNCE_ONE_PASS) || es_bounce_wants_rays(s)) {
         es_arena_reset(&r->arena);
         result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, r->vpls + job.first_sender, job.sender_count, in->extent, &visibility);
         job.scene = &r->trace_scene;
@@ -102,7 +107,7 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
-    uint32_t words[] = {s->bounces, s->bounce_method, s->bounce_vpls, s->bounce_points, s->method, s->seed, s->interleave, s->glossy_vpls, s->traced_bias, s->ism_size, s->pull_push, s->pull_push_levels, r->first_vpls};
+    uint32_t words[] = {s->bounces, s->bounce_method, s->bounce_vpls, s->bounce_points, s->bounce_rays, s->method, s->seed, s->interleave, s->glossy_vpls, s->traced_bias, s->ism_size, s->pull_push, s->pull_push_levels, r->first_vpls};
     es_plan_reads(plan, words, sizeof words);
     float numbers[] = {s->ism_bias, s->ism_slope_bias, s->lobe_roughness, s->push_threshold, in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);

@@ -8,6 +8,8 @@
 uint32_t es_bounce_capacity(const es_renderer_settings* settings);
 /* How many this frame has, once those of the first bounce are placed. */
 uint32_t es_bounce_room(const es_renderer* renderer);
+/* Are rays to places of lights, by which shadow maps are judged? */
+bool es_bounce_wants_rays(const es_renderer_settings* settings);
 /* Are the scene's points wanted that reflective maps are drawn from? */
 bool es_bounce_wants_points(const es_renderer_settings* settings);
 /* After the first bounce's lights, their maps and the hierarchy. Sets es_renderer.vpl_count and what the frame's statistics say of bounces. */

@@ -10,6 +10,9 @@
 
 enum { RUN = 256, LANES = 8 };
 
+/* Of a place that a map hides. Places found by it come with the inverse of it times the power of others, which shows where there are many such. */
+#define DOUBT 0.125f
+
 typedef struct bounce_loop {
     const es_bounce_job* job;
     const es_gi_kernels* kernels;
@@ -21,6 +24,9 @@ typedef struct bounce_loop {
 
 static es_vec3 vector_of(const float v[3]) { return es_v3(v[0], v[1], v[2]); }
 static float luminance(es_vec3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+
+/* Maps say where to look, rays what is seen. */
+static bool draws_rays(const es_bounce_job* job) { return job->method == ES_BOUNCE_ONE_PASS && job->maps && job->scene && job->rays; }
 
 static es_bounce_sender sender_of(const es_bounce_job* job, uint32_t sender)
 {
@@ -39,6 +45,7 @@ static es_bounce_sender sender_of(const es_bounce_job* job, uint32_t sender)
     if (job->maps) {
         s.map = job->maps->texels + (size_t)sender * job->maps->size * job->maps->size;
         s.map_size = job->maps->size;
+        s.doubt = draws_rays(job) ? DOUBT : 0.0f;
         s.far_distance = job->maps->far_distance;
     }
     return s;
@@ -61,26 +68,37 @@ static es_vec3 point_of(const es_surfel_set* set, uint32_t i) { return es_v3(set
 
 /* ---- weights of a sender's places --------------------------------------------------------------------------------------- */
 
+/* From the sender to the point, off both. */
+static es_ray ray_to(const es_bounce_job* job, uint32_t sender, const es_surfel_set* set, uint32_t i)
+{
+    const es_vec3 from = vector_of(job->vpls[sender].position), end = job->ends[sender - job->first_sender];
+    es_vec3 p = point_of(set, i), n = es_unpack_normal(set->normal[i]);
+    if (es_v3_dot(n, es_v3_sub(from, p)) < 0.0f) n = es_v3_scale(n, -1.0f);
+    p = es_offset_origin(es_v3_add(p, es_v3_scale(n, job->extent * ES_RAY_OFFSET_SHARE)), n);
+    return (es_ray){{end.x, end.y, end.z}, 0.0f, {p.x - end.x, p.y - end.y, p.z - end.z}, 1.0f};
+}
+
+static void trace(const es_bounce_job* job, const es_ray* rays, uint32_t count, uint8_t* blocked)
+{
+    if (job->scene->has_masks)
+        for (uint32_t i = 0; i < count; i++) blocked[i] = es_trace_blocked(job->scene, rays[i]);
+    else
+        es_bvh_any(job->scene->bvh, ES_RAYS_SINGLE, rays, count, blocked);
+}
+
 /* Points behind something send nothing on: a ray from each that would receive. */
 static void remove_hidden(const es_bounce_job* job, uint32_t sender, const es_surfel_set* set, float* weights, float* sums)
 {
-    const es_vec3 from = vector_of(job->vpls[sender].position), end = job->ends[sender - job->first_sender];
     es_ray rays[RUN];
     uint8_t blocked[RUN];
     for (uint32_t begin = 0; begin < set->count; begin += RUN) {
         uint32_t places[RUN], count = 0;
         for (uint32_t i = begin; i < set->count && i < begin + RUN; i++) {
             if (!(weights[i] > 0.0f)) continue;
-            es_vec3 p = point_of(set, i), n = es_unpack_normal(set->normal[i]);
-            if (es_v3_dot(n, es_v3_sub(from, p)) < 0.0f) n = es_v3_scale(n, -1.0f);
-            p = es_offset_origin(es_v3_add(p, es_v3_scale(n, job->extent * ES_RAY_OFFSET_SHARE)), n);
-            rays[count] = (es_ray){{end.x, end.y, end.z}, 0.0f, {p.x - end.x, p.y - end.y, p.z - end.z}, 1.0f};
+            rays[count] = ray_to(job, sender, set, i);
             places[count++] = i;
         }
-        if (job->scene->has_masks)
-            for (uint32_t i = 0; i < count; i++) blocked[i] = es_trace_blocked(job->scene, rays[i]);
-        else
-            es_bvh_any(job->scene->bvh, ES_RAYS_SINGLE, rays, count, blocked);
+        trace(job, rays, count, blocked);
         for (uint32_t i = 0; i < count; i++)
             if (blocked[i]) weights[places[i]] = 0.0f;
     }
@@ -105,7 +123,7 @@ static size_t weigh(const bounce_loop* loop, uint32_t sender, const es_bounce_se
     float *weights = loop->weights + worker * loop->places, *sums = loop->sums + worker * (loop->places / LANES);
     if (job->method == ES_BOUNCE_ONE_PASS) {
         loop->kernels->bounce_weights(s, &set, weights, sums);
-        if (job->scene) remove_hidden(job, sender, &set, weights, sums);
+        if (job->scene && !job->maps) remove_hidden(job, sender, &set, weights, sums);
         return set.count;
     }
     const es_reflective_map map = {.size = job->size, .levels = job->levels, .push = (uint32_t)(es_clampf(job->push_threshold, 0.0f, 1.0f) * (float)ES_PARABOLIC_DEPTH_MAX), .keys = loop->keys + worker * loop->key_words, .scratch = loop->scratch + worker * loop->scratch_words};
@@ -135,6 +153,32 @@ static size_t choose(const float* weights, const float* sums, size_t count, doub
         if (sum > threshold) break;
     }
     return found;
+}
+
+/* Draws places by their weights, evenly spread, and takes one of those that are seen, all of which are as likely; keeps its number and gives the share
+ * of places that are seen. Each drawn one has a rank that stays from frame to frame, and the highest wins, so that the others may come and go. */
+static double choose_seen(const bounce_loop* loop, uint32_t sender, const float* weights, const float* sums, double total, float u, uint32_t number, size_t* chosen)
+{
+    const es_bounce_job* job = loop->job;
+    const es_surfel_set set = es_surfels_subset(job->surfels, job->points, subset_of(loop, sender));
+    es_ray rays[ES_BOUNCE_MAX_RAYS];
+    uint8_t blocked[ES_BOUNCE_MAX_RAYS];
+    size_t drawn[ES_BOUNCE_MAX_RAYS];
+    for (uint32_t i = 0; i < job->rays; i++) {
+        drawn[i] = choose(weights, sums, loop->places, total, ((float)i + u) / (float)job->rays);
+        rays[i] = ray_to(job, sender, &set, (uint32_t)drawn[i]);
+    }
+    trace(job, rays, job->rays, blocked);
+    uint32_t seen = 0, highest = 0;
+    for (uint32_t i = 0; i < job->rays; i++) {
+        const uint32_t rank = es_random_u32(number, 0x80000000u + i);
+        if (blocked[i]) continue;
+        if (!seen++ || rank > highest) {
+            *chosen = drawn[i];
+            highest = rank;
+        }
+    }
+    return (double)seen / (double)job->rays;
 }
 
 /* What a place chosen of a sender's receives, as if it were certain to be chosen. */
@@ -209,7 +253,7 @@ static es_vpl_record make_light(const bounce_loop* loop, uint32_t light, uint32_
     float u = es_radical_inverse(2, place_in_sequence(light, job->count, job->subsets) + 1) + es_unit_float(loop->shift);
     if (u >= 1.0f) u -= 1.0f;
 
-    double total = 0.0, weight = 0.0;
+    double total = 0.0, weight = 0.0, seen = 1.0;
     place kept = {0};
     uint32_t first = job->sender_count ? light % job->sender_count : 0, number = 0;
     for (uint32_t k = first; k < job->sender_count; k += job->count, number++) {
@@ -223,13 +267,16 @@ static es_vpl_record make_light(const bounce_loop* loop, uint32_t light, uint32_
         total += sum;
         /* of the senders so far this one is taken with its share, so each has its own in the end */
         if (number && !((double)es_random_float(own, number) * total < sum)) continue;
-        size_t chosen = choose(weights, sums, places, sum, u);
-        weight = (double)weights[chosen];
+        size_t chosen = 0;
+        if (draws_rays(job)) seen = choose_seen(loop, sender, weights, sums, sum, u, own, &chosen);
+        else chosen = choose(weights, sums, places, sum, u);
+        weight = seen > 0.0 ? (double)weights[chosen] : 0.0;
+        if (!(weight > 0.0)) continue;
         kept = place_at(loop, sender, &s, chosen, worker);
     }
     if (!(weight > 0.0)) return (es_vpl_record){.normal = {0, 1, 0}, .tangent = {0, 0, 1}, .bitangent = {1, 0, 0}, .incident = {0, 1, 0}, .roughness = 1.0f, .model = ES_SURFACE_UNLIT};
     uint32_t sharing = job->count > job->sender_count ? (job->count - first + job->sender_count - 1) / job->sender_count : 1;
-    return record_of(loop, &kept, total / weight, 1.0f / (float)sharing);
+    return record_of(loop, &kept, total / weight * seen, 1.0f / (float)sharing);
 }
 
 static void make_lights(void* user, uint32_t begin, uint32_t end, uint32_t worker)

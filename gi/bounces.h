@@ -10,7 +10,12 @@
  *
  * ONE_PASS (Knecht §3.6): the places are points of the scene, each of which stands for an area a. A sender of intensity I(d), W/sr, gives one of them
  *     I(d) · cos / r² · a · V,      V by the sender's shadow map, as for a pixel, or by a ray.
- * Every sender has its own set of points, stratified over the scene.
+ * Every sender has its own set of points, stratified over the scene. Maps of few texels let light through walls, and each bounce would pass
+ * on what the one before lost that way. So maps only say where to look: a place they hide keeps a small share of its weight, some places are drawn by
+ * these weights, q_i, rays find which of them are seen, and one of those is taken. It has
+ *     f_i / q_i · seen / drawn,
+ * which is right on average whatever the map says, and has a variance near that of exact weights: two stages, as in resampled importance sampling
+ * (Talbot et al. 2005).
  *
  * REFLECTIVE (Ritschel thesis §5.3.1): the places are texels of a parabolic map about the sender into which points are drawn, keys of
  * depth and point, the nearest winning; holes and points that shine through are filled from coarser levels, by pull-push of the keys. A
@@ -24,6 +29,8 @@
 #include "gi/surfels.h"
 #include "gi/vpl_visibility.h"
 
+enum { ES_BOUNCE_MAX_RAYS = 64 };
+
 typedef struct es_bounce_job {
     uint32_t method;                    /* es_bounce_method */
     es_vpl_record* vpls;                /* senders [first_sender, first_sender + sender_count), lights from `first` on */
@@ -36,6 +43,7 @@ typedef struct es_bounce_job {
     const es_trace_scene* scene;        /* for rays; NULL: none */
     const es_vec3* ends;                /* with a scene: es_vpl_visibility.ends of the senders */
     float extent, near_distance, bias, slope_bias; /* metres */
+    uint32_t rays;                      /* with maps and a scene: places tried by rays for each light */
     float lobe_roughness;
     bool glossy;                        /* lights send their surface's lobe too */
     /* REFLECTIVE */
@@ -56,6 +64,7 @@ typedef struct es_bounce_sender {
     uint32_t model;
     bool glossy;
     const uint16_t* map;                /* NULL: everything is seen */
+    float doubt;                        /* share of its weight that a place has which the map hides */
     uint32_t map_size;
     float far_distance, bias, slope_bias;
     float near_distance;                /* closer points count as so far, and are not drawn */

@@ -44,9 +44,9 @@ typedef enum es_antialias {
 /* Where the lights of a bounce after the first stand. Both have as many lights a bounce as asked for, each of which reflects a share of
  * the lights of the bounce before, and both choose at random, with a probability by what is received and reflected, the power divided by it. */
 typedef enum es_bounce_method {
-    ES_BOUNCE_ONE_PASS,   /* on one of a few points of the scene that the reflected light's own shadow map says it sees (Knecht §3.6, and what §6.1 asks for) */
-    ES_BOUNCE_REFLECTIVE  /* on a texel of an imperfect reflective shadow map drawn for the reflected light (Ritschel thesis §5.3.1); slower, but
-                          * where imperfect maps let light through walls, as in scenes much larger than their walls are thick, it does not pass that on */
+    ES_BOUNCE_ONE_PASS,   /* on one of a few points of the scene that the reflected light's own shadow map says it sees (Knecht §3.6, and what §6.1 asks for),
+                           * and rays confirm (bounce_rays): without them, what leaks through imperfect maps grows with each bounce */
+    ES_BOUNCE_REFLECTIVE  /* on a texel of an imperfect reflective shadow map drawn for the reflected light (Ritschel thesis §5.3.1); slower, needs no rays */
 } es_bounce_method;
 
 enum { ES_MAX_BOUNCES = 16 };
@@ -125,6 +125,7 @@ typedef struct es_renderer_settings {
     uint32_t bounce_method;          /* es_bounce_method */
     uint32_t bounce_vpls;            /* lights of each bounce after the first */
     uint32_t bounce_points;          /* ONE_PASS: points tried for each light that is reflected */
+    uint32_t bounce_rays;            /* ONE_PASS with shadow maps: rays for each light, to some of those points; 0: the maps alone say what is seen */
 } es_renderer_settings;
 
 ES_API es_renderer_settings es_default_renderer_settings(void);

@@ -10,9 +10,10 @@ static const es_setting renderer_table[] = {
     {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic|vpl-traced|vpl-sampled", "indirect light: none, imperfect shadow maps, an accurate map per light, rays to every light, or to one a pixel", AT(method)},
     {"skip", ES_SETTING_BOOL, "true", 0, 1, NULL, "skip work whose result would be the same bits", AT(skip)},
     {"bounces", ES_SETTING_INT, "1", 0, ES_MAX_BOUNCES, NULL, "indirect bounces", AT(bounces)},
-    {"bounce.method", ES_SETTING_CHOICE, "reflective", 0, 0, "one-pass|reflective", "lights of bounces after the first: on points seen by shadow maps, or on texels of reflective maps", AT(bounce_method)},
+    {"bounce.method", ES_SETTING_CHOICE, "one-pass", 0, 0, "one-pass|reflective", "lights of bounces after the first: on points seen by shadow maps, or on texels of reflective maps", AT(bounce_method)},
     {"bounce.vpls", ES_SETTING_INT, "256", 0, 16384, NULL, "virtual point lights of each bounce after the first", AT(bounce_vpls)},
     {"bounce.points", ES_SETTING_INT, "256", 64, 65536, NULL, "bounce.method one-pass: points tried for each light that is reflected, a multiple of 64", AT(bounce_points)},
+    {"bounce.rays", ES_SETTING_INT, "8", 0, 64, NULL, "bounce.method one-pass with shadow maps: rays for each light to what the maps show; 0: maps alone", AT(bounce_rays)},
 
     {"shadow.size", ES_SETTING_INT, "1024", 16, 8192, NULL, "texels of a shadow map's side", AT(shadow_size)},
     {"shadow.bias", ES_SETTING_FLOAT, "0.5", 0, 64, NULL, "constant depth bias, texels", AT(shadow_bias)},

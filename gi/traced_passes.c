@@ -1,5 +1,6 @@
 /* Passes of methods that trace rays: the hierarchy they go through, and what the bias of virtual point lights leaves out. */
 #include "gi/bias_compensation.h"
+#include "gi/bounce_pass.h"
 #include "gi/renderer.h"
 #include "gi/vpl_visibility.h"
 
@@ -7,7 +8,7 @@
 es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world* world)
 {
     es_plan* plan = &r->plan;
-    const bool wanted = r->settings.method == ES_GI_VPL_TRACED || r->settings.method == ES_GI_VPL_SAMPLED || r->settings.traced_bias == ES_TRACED_COMPENSATED ||
+    const bool wanted = es_bounce_wants_rays(&r->settings) || r->settings.method == ES_GI_VPL_TRACED || r->settings.method == ES_GI_VPL_SAMPLED || r->settings.traced_bias == ES_TRACED_COMPENSATED ||
         (r->settings.near_distance > 0.0f && r->settings.traced_bias == ES_TRACED_BOUNDED);
     const char* why = !wanted ? "nothing is found by rays" : in->no_indirect ? in->no_indirect : r->first_vpls ? NULL : "the lights reach nothing";
     if (why) {

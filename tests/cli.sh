@@ -421,7 +421,7 @@ for drawing in glob.glob('figures/*.svg'):
     tree.parse(drawing)
 text = open('figures/index.html').read()
 page = tree.fromstring(text)  # well-formed as XML too
-assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
+assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'bounces', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
 names = {element.tag for element in page.iter()}
 assert not names & {'script', 'link', 'iframe', 'object', 'image', 'use'}, names
 assert not re.search(r'https?:|url\(|@import|src="(?!data:image/png;base64,)', text), 'the page loads something'

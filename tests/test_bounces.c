@@ -17,7 +17,7 @@ enum { SEEDS = 1, FEW_SEEDS = 2, STATISTICS = 0 };
 #else
 enum { SEEDS = 3, FEW_SEEDS = 24, STATISTICS = 1 };
 #endif
-enum { BOUNCES = 4, WIDTH = 44, HEIGHT = 33 };
+enum { BOUNCES = 4, WIDTH = 44, HEIGHT = 33, FRAMES = 7 };
 
 static void add_box(small_world* w, const es_material_desc* walls, const es_material_desc* red)
 {
@@ -277,6 +277,51 @@ static void test_skipping(void** state)
     small_world_destroy(&w);
 }
 
+/* While things move: lights that stay on their surfaces, history and kept maps give what a renderer does that does all of it anew. */
+static void test_moving(void** state)
+{
+    for (uint32_t bounce_method = 0; bounce_method < 2; bounce_method++) {
+        es_context* context;
+        es_world* worlds[2];
+        es_renderer* renderers[2];
+        assert_int_equal(es_context_create(NULL, &context), ES_OK);
+        uint64_t last = 0, changes = 0;
+        for (int i = 0; i < 2; i++) {
+            es_renderer_settings s = settings_of(ES_GI_ISM, bounce_method);
+            s.bounces = 3;
+            s.vpls = s.bounce_vpls = 64;
+            s.ism_points = 1024;
+            s.stable_vpls = s.temporal = true;
+            s.skip = i == 0;
+            assert_int_equal(es_world_create_scene(context, "cornell-stack", NULL, &worlds[i]), ES_OK);
+            assert_int_equal(es_renderer_create(context, &s, &renderers[i]), ES_OK);
+        }
+        for (int frame = 0; frame < FRAMES; frame++) {
+            uint64_t hashes[2][3];
+            for (int i = 0; i < 2; i++) {
+                /* twice nothing moves */
+                if (frame != 2 && frame != 3) assert_int_equal(es_world_step(worlds[i], 1.0f / 30), ES_OK);
+                assert_int_equal(es_renderer_render(renderers[i], worlds[i]), ES_OK);
+                static const char* const names[] = {"indirect", "indirect-3", "display"};
+                for (int n = 0; n < 3; n++) {
+                    es_image image = picture(renderers[i], names[n]);
+                    hashes[i][n] = es_image_hash(&image);
+                    es_image_destroy(context, &image);
+                }
+            }
+            if (memcmp(hashes[0], hashes[1], sizeof hashes[0]) != 0) fail_msg("frame %d differs with bounce.method %u", frame, bounce_method);
+            changes += hashes[0][1] != last;
+            last = hashes[0][1];
+        }
+        assert_true(changes > 3);
+        for (int i = 0; i < 2; i++) {
+            es_renderer_destroy(renderers[i]);
+            es_world_destroy(worlds[i]);
+        }
+        es_context_destroy(context);
+    }
+}
+
 /* One thread and every instruction set at hand. */
 static void test_bits(void** state)
 {
@@ -316,6 +361,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_furnace), cmocka_unit_test(test_selection), cmocka_unit_test(test_agreement),
         cmocka_unit_test(test_sum),     cmocka_unit_test(test_skipping),  cmocka_unit_test(test_bits),
+        cmocka_unit_test(test_moving),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

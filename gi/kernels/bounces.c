@@ -33,7 +33,7 @@ VINL vf facing(const es_bounce_sender* s, vf cosine, vi albedo_b)
     return vf_select(backs, vf_abs(cosine), vf_max(cosine, vf_zero()));
 }
 
-/* weights[i] = luminance of I(d) cos / r² a V (albedo + specular), sums[i / 8] the sum of eight. Both are written up to the next multiple of eight. */
+/* weights[i] = luminance of I(d) cos / r² a V (albedo + specular), V being 1 or `doubt`, sums[i / 8] the sum of eight. Both are written up to the next multiple of eight. */
 void ES_KERNEL(es_gi_bounce_weights)(const es_bounce_sender* s, const es_surfel_set* points, float* weights, float* sums)
 {
     const vf zero = vf_zero(), half = vf_set1(0.5f * (float)s->map_size), last = vf_set1((float)s->map_size - 0.5f), near2 = vf_set1(s->near_distance * s->near_distance);
@@ -50,7 +50,7 @@ void ES_KERNEL(es_gi_bounce_weights)(const es_bounce_sender* s, const es_surfel_
         if (points->count - i < VW) lit &= vm_first((int32_t)(points->count - i));
         vf weight = zero;
         if (vm_any(lit)) {
-            vf r2 = vf_max(dx * dx + dy * dy + dz * dz, near2), r = vf_sqrt(r2);
+            vf r2 = vf_max(dx * dx + dy * dy + dz * dz, near2), r = vf_sqrt(r2), share = vf_set1(1.0f);
             if (s->map) {
                 vf qx = dx * vf_set1(s->tangent[0]) + dy * vf_set1(s->tangent[1]) + dz * vf_set1(s->tangent[2]);
                 vf qy = dx * vf_set1(s->bitangent[0]) + dy * vf_set1(s->bitangent[1]) + dz * vf_set1(s->bitangent[2]);
@@ -61,13 +61,14 @@ void ES_KERNEL(es_gi_bounce_weights)(const es_bounce_sender* s, const es_surfel_
                 vi depth;
                 vi_store(place, at);
                 for (int k = 0; k < VW; k++) depth[k] = s->map[place[k]];
-                lit &= vm_le((r * depth_scale - bias) * received - slope_bias * r, vf_from_int(depth) * received);
+                vm seen = vm_le((r * depth_scale - bias) * received - slope_bias * r, vf_from_int(depth) * received);
+                share = vf_select(seen, share, vf_set1(s->doubt));
             }
             vf inverse = vf_set1(1.0f) / r, sent[3], reflected[3];
             sent_towards(s, dx * inverse, dy * inverse, dz * inverse, sent);
             reflectance(vi_load(points->albedo_rg + i), albedo_b, vi_load(points->surface + i), reflected);
             vf g = vf_load(points->area + i) * (qz * inverse) * (received * inverse) * (inverse * inverse);
-            weight = vf_and(lit, g * (sent[0] * reflected[0] + sent[1] * reflected[1] + sent[2] * reflected[2]));
+            weight = vf_and(lit, share * g * (sent[0] * reflected[0] + sent[1] * reflected[1] + sent[2] * reflected[2]));
         }
         vf_store(weights + i, weight);
         sums[i / VW] = vf_sum(weight);
