@@ -15,6 +15,7 @@ typedef struct es_compose_job {
     const float* direct[3];       /* NULL: none */
     const float* irradiance[3];   /* indirect irradiance on the diffuse part, NULL: none */
     const float* specular[3];     /* indirect radiance reflected by the lobe, NULL: none */
+    const uint8_t* lit;           /* where that may be lit (gi/lit.h) */
     const float* compensation[3]; /* further reflected indirect radiance, of either sign; NULL: none */
     const float* finished[3];     /* the radiance itself, in place of all of the above; NULL: it is to be made */
     float exposure_scale;         /* 2^stops */

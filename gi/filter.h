@@ -18,6 +18,9 @@ typedef struct es_filter_job {
     uint32_t plane_count;          /* 1 … 6 */
     const float* source[6];        /* rows of gbuffer->stride */
     float* result[6];              /* not the sources */
+    /* where planes 3 … 5 may be lit (gi/lit.h), of sources and results, the latter in and out; NULL: it is looked up, and not kept */
+    const uint8_t* source_lit;
+    uint8_t* result_lit;
 } es_filter_job;
 
 es_result es_filter_geometry_aware(es_context* context, es_arena* arena, const es_filter_job* job);

@@ -14,8 +14,8 @@
 #include "gi/gi.h"
 #include "gi/temporal.h"
 
-/* Three planes of floats, rows of the G-buffer's stride. */
-typedef struct es_planes { float* at[3]; void* memory; size_t bytes; } es_planes;
+/* Three planes of floats, rows of the G-buffer's stride; `lit` (gi/lit.h) is kept for planes of specular radiance alone. */
+typedef struct es_planes { float* at[3]; uint8_t* lit; void* memory; size_t bytes; } es_planes;
 
 typedef struct es_history {
     bool complete;             /* the last frame was rendered to its end, with history */

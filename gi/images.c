@@ -153,6 +153,7 @@ static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* 
         irradiance = renderer->irradiance;
         specular = renderer->specular;
     }
+    if (kind == IMAGE_INDIRECT_UNFILTERED) job.lit = NULL;
     if (kind != IMAGE_DISPLAY && kind != IMAGE_RADIANCE) memset(job.finished, 0, sizeof job.finished);
     float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : job.indirect;
     for (int k = 0; k < 3; k++) {

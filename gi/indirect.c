@@ -1,5 +1,8 @@
 #include "gi/indirect.h"
 
+#include <string.h>
+
+#include "gi/lit.h"
 #include "gi/near_light.h"
 #include "gi/surface.h"
 #include "gi/vpl_visibility.h"
@@ -55,6 +58,7 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
         job.irradiance[k] = irradiance->at[k];
         job.specular[k] = r->has_specular ? specular->at[k] : NULL;
     }
+    job.lit = r->has_specular ? specular->lit : NULL;
     es_arena_reset(&r->arena);
     es_vpl_visibility visibility;
     if (traced) {
@@ -123,7 +127,8 @@ es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const 
         if (!result && r->has_specular) result = es_planes_resize(r->context, &stages_specular[i], shaded);
     }
     for (uint32_t pass = 0; pass < r->filter_passes && !result; pass++) {
-        es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
+        es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3,
+            .source_lit = specular->lit, .result_lit = stages_specular[pass % 2].lit};
         for (int k = 0; k < 3; k++) {
             job.source[k] = irradiance->at[k];
             job.result[k] = stages_irradiance[pass % 2].at[k];
@@ -184,6 +189,7 @@ es_result es_indirect_upsample(es_renderer* r, const es_planes* irradiance, cons
     es_result result = es_planes_resize(r->context, whole_irradiance, &r->gbuffer);
     if (!result && r->has_specular) result = es_planes_resize(r->context, whole_specular, &r->gbuffer);
     if (result) return result;
+    if (r->has_specular) memset(whole_specular->lit, 1, (size_t)es_lit_chunks(r->gbuffer.stride) * r->gbuffer.height);
     es_upsample_job job = {.gbuffer = &r->gbuffer, .half = &r->half, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3};
     for (int k = 0; k < 3; k++) {
         job.source[k] = irradiance->at[k];

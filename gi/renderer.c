@@ -7,6 +7,7 @@
 #include "gi/classic.h"
 #include "gi/direct.h"
 #include "gi/indirect.h"
+#include "gi/lit.h"
 #include "gi/passes.h"
 #include "platform/context.h"
 #include "platform/maths.h"
@@ -19,13 +20,14 @@ float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inp
 
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer)
 {
-    size_t floats = (size_t)gbuffer->stride * gbuffer->height, bytes = 3 * floats * sizeof(float);
+    size_t floats = (size_t)gbuffer->stride * gbuffer->height, bytes = 3 * floats * sizeof(float) + (size_t)es_lit_chunks(gbuffer->stride) * gbuffer->height;
     if (planes->bytes == bytes) return ES_OK;
     es_planes_free(context, planes);
     planes->memory = es_allocate_zero(context, bytes); /* passes write pixels, vectors read the padding of rows as well */
     if (!planes->memory) return es_context_last_result(context);
     planes->bytes = bytes;
     for (int k = 0; k < 3; k++) planes->at[k] = (float*)planes->memory + (size_t)k * floats;
+    planes->lit = (uint8_t*)planes->memory + 3 * floats * sizeof(float);
     return ES_OK;
 }
 
@@ -410,6 +412,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure), .white = s->white, .tone_map = s->tone_map};
     const es_planes* irradiance = es_indirect_irradiance(r);
     const es_planes* specular = es_indirect_specular(r);
+    job.lit = specular->lit;
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];

@@ -75,6 +75,7 @@ typedef struct es_shade_job {
     /* out, rows of gbuffer->stride; 0 where nothing is seen */
     float* irradiance[3];
     float* specular[3];            /* NULL: pixels have no lobes */
+    uint8_t* lit;                  /* where these may be lit (gi/lit.h), in and out; NULL: not kept */
 } es_shade_job;
 
 es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job);

@@ -40,6 +40,9 @@ typedef struct es_temporal_job {
     const float* source[6];           /* this frame's, rows of the G-buffer's stride */
     const float* history[6];          /* last frame's result */
     float* result[6];                 /* neither of them; NULL with `confidence` alone */
+    /* where planes 3 … 5 may be lit (gi/lit.h), the result's in and out; NULL: anywhere, and not kept; all three or none */
+    const uint8_t *source_lit, *history_lit;
+    uint8_t* result_lit;
     float* confidence;                /* NULL: not wanted */
     float base, position, normal, illumination;
     float extent;                     /* metres */

@@ -190,6 +190,11 @@ static es_result blend(es_renderer* r, const es_frame_inputs* in)
         job.history[k + 3] = h->specular[from].at[k];
         job.result[k + 3] = h->specular[to].at[k];
     }
+    if (job.plane_count == 6) {
+        job.source_lit = specular->lit;
+        job.history_lit = h->specular[from].lit;
+        job.result_lit = h->specular[to].lit;
+    }
     es_arena_reset(&r->arena);
     result = es_temporal_compare(r->context, &r->arena, &job);
     if (result) return result;

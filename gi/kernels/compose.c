@@ -5,6 +5,7 @@
  * PBR Neutral the Khronos tone mapper (specification of 2024). Both are applied to linear Rec.709.
  */
 #include "gi/kernel_table.h"
+#include "gi/lit.h"
 #include "platform/simd.h"
 #include "raster/pack.h"
 
@@ -67,7 +68,7 @@ VINL rgb_v radiance_at(const es_compose_job* job, size_t at)
         indirect.g = albedo.g * diffuse * vf_load(job->irradiance[1] + at);
         indirect.b = albedo.b * diffuse * vf_load(job->irradiance[2] + at);
     }
-    if (job->specular[0]) {
+    if (job->specular[0] && (!job->lit || job->lit[(at / g->stride) * es_lit_chunks(g->stride) + at % g->stride / ES_LIT_COLUMNS] & 1)) {
         indirect.r = indirect.r + vf_load(job->specular[0] + at);
         indirect.g = indirect.g + vf_load(job->specular[1] + at);
         indirect.b = indirect.b + vf_load(job->specular[2] + at);

@@ -1,6 +1,7 @@
 /* The geometry-aware box filter on one block of the image (gi/filter.h). */
 #include "gi/filter.h"
 #include "gi/kernel_table.h"
+#include "gi/lit.h"
 #include "platform/simd.h"
 #include "raster/pack.h"
 
@@ -188,6 +189,7 @@ static bool lobes_are_dark(const es_filter_job* job, uint32_t x0, uint32_t first
 {
     const es_gbuffer* g = job->gbuffer;
     const uint32_t begin = x0 > ES_FILTER_MARGIN ? x0 - ES_FILTER_MARGIN : 0, stop = x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN < g->stride ? x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN : g->stride;
+    if (job->source_lit) return !es_lit_within(job->source_lit, es_lit_chunks(g->stride), begin, stop, first, end);
     for (uint32_t y = first; y < end; y++) {
         const size_t row = (size_t)y * g->stride;
         vi bits = vi_zero();
@@ -197,6 +199,17 @@ static bool lobes_are_dark(const es_filter_job* job, uint32_t x0, uint32_t first
     }
     return true;
 }
+
+/* Says what a row of the block will be, and returns whether it may have been lit. */
+static bool set_lit(const es_filter_job* job, uint32_t x0, uint32_t y, uint8_t now)
+{
+    if (!job->result_lit) return true;
+    uint8_t* lit = job->result_lit + (size_t)y * es_lit_chunks(job->gbuffer->stride) + x0 / ES_LIT_COLUMNS;
+    const bool was = *lit & 1;
+    *lit = now;
+    return was;
+}
+_Static_assert((int)ES_FILTER_COLUMNS == (int)ES_LIT_COLUMNS, "blocks share no chunk");
 
 void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0, es_filter_scratch* s)
 {
@@ -217,10 +230,13 @@ void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0,
     uint32_t planes = job->plane_count;
     if (planes == 6 && lobes_are_dark(job, x0, first, end)) {
         planes = 3;
-        for (uint32_t y = y0; y < y1; y++)
+        for (uint32_t y = y0; y < y1; y++) {
+            if (!set_lit(job, x0, y, 0)) continue;
             for (uint32_t k = 3; k < 6; k++)
                 for (uint32_t x = 0; x < columns; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x0 + x, vf_zero());
+        }
     }
+    for (uint32_t y = y0; y < y1 && planes == 6; y++) set_lit(job, x0, y, 1);
 
     for (uint32_t y = first; y < end; y++) {
         load_line(job, x0, y, planes, s);

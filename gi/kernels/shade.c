@@ -9,6 +9,7 @@
 
 #include "gi/kernel_table.h"
 #include "gi/kernels/surface_simd.h"
+#include "gi/lit.h"
 #include "gi/shade.h"
 #include "platform/simd16.h"
 #include "raster/pack.h"
@@ -383,6 +384,40 @@ static void scatter(const es_gbuffer* g, const lanes_of_phase* p, uint32_t n, fl
     }
 }
 
+/* Where planes of specular radiance may be lit, bit 1 says whether they were before this block began: zeros are not written over zeros. */
+static uint8_t* lit_at(const es_shade_job* job, uint32_t x, uint32_t y) { return job->lit + (size_t)y * es_lit_chunks(job->gbuffer->stride) + x / ES_LIT_COLUMNS; }
+
+static void begin_lit(const es_shade_job* job, const es_shade_block* block)
+{
+    const uint32_t n = job->interleave, end = es_lit_chunks(job->gbuffer->stride), first = block->column * n / ES_LIT_COLUMNS;
+    for (uint32_t y = block->phase_y + block->row * n; y < job->gbuffer->height && y < (block->row + block->rows) * n; y += n)
+        for (uint32_t c = first; c < end && c < first + ES_SHADE_COLUMNS * n / ES_LIT_COLUMNS; c++) {
+            uint8_t* lit = lit_at(job, c * ES_LIT_COLUMNS, y);
+            *lit = (uint8_t)((*lit & 1) << 1);
+        }
+}
+
+static void scatter_lobes(const es_shade_job* job, const lanes_of_phase* p, const es_shade_batch* batch)
+{
+    const uint32_t n = job->interleave;
+    for (uint32_t j = 0; j < p->rows; j++) {
+        const uint32_t y = p->y0 + j * n;
+        const size_t row = (size_t)y * job->gbuffer->stride + p->x0;
+        for (uint32_t i = 0; i < p->columns; i += VW) {
+            const uint32_t end = p->columns - i < VW ? p->columns : i + VW, at = j * p->lanes;
+            uint8_t *first = lit_at(job, p->x0 + i * n, y), *last = lit_at(job, p->x0 + (end - 1) * n, y);
+            if (batch->lobed[(at + i) / VW]) {
+                *first |= 1;
+                *last |= 1;
+            } else if (!((*first | *last) & 2)) {
+                continue;
+            }
+            for (int k = 0; k < 3; k++)
+                for (uint32_t x = i; x < end; x++) job->specular[k][row + (size_t)x * n] = batch->s[k][at + x];
+        }
+    }
+}
+
 /* A phase without lights. */
 static void darken(const es_shade_job* job, const lanes_of_phase* p)
 {
@@ -391,7 +426,7 @@ static void darken(const es_shade_job* job, const lanes_of_phase* p)
         for (int k = 0; k < 3; k++)
             for (uint32_t i = 0; i < p->columns; i++) {
                 job->irradiance[k][row + (size_t)i * job->interleave] = 0.0f;
-                if (job->specular[0]) job->specular[k][row + (size_t)i * job->interleave] = 0.0f;
+                if (job->specular[0] && (!job->lit || *lit_at(job, p->x0 + i * job->interleave, p->y0 + j * job->interleave) & 2)) job->specular[k][row + (size_t)i * job->interleave] = 0.0f;
             }
     }
 }
@@ -424,13 +459,15 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
     }
     if (job->near) job->near->add(job->near, batch, lanes, lobes);
     scatter(job->gbuffer, p, n, batch->e, job->irradiance);
-    if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);
+    if (job->specular[0] && job->lit) scatter_lobes(job, p, batch);
+    else if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);
 }
 
 void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)
 {
     const es_gbuffer* g = job->gbuffer;
     const uint32_t n = job->interleave;
+    if (job->lit) begin_lit(job, block);
     for (uint32_t phase_x = 0; phase_x < n; phase_x++) {
         if (phase_x >= g->width || block->phase_y >= g->height) break;
         uint32_t columns = (g->width - phase_x + n - 1) / n, rows = (g->height - block->phase_y + n - 1) / n;

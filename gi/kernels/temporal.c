@@ -5,6 +5,7 @@
  * that fades by a share each frame would end in denormals.
  */
 #include "gi/kernel_table.h"
+#include "gi/lit.h"
 #include "gi/temporal.h"
 #include "platform/simd.h"
 #include "raster/pack.h"
@@ -23,6 +24,16 @@ VINL vf depth_expected(const es_temporal_job* job, vf x, vf y, vf depth)
 }
 
 /* ---- tiles ----------------------------------------------------------------------------------------------------------- */
+
+/* May a lobe reflect anything at a row of a tile's samples, or have done so where they were? */
+static bool lobes_count(const es_temporal_job* job, uint32_t tile, uint32_t row, vi from)
+{
+    const uint32_t stride = job->gbuffer->stride, chunks = es_lit_chunks(stride), x0 = tile * ES_TEMPORAL_TILE;
+    if (es_lit_within(job->source_lit, chunks, x0, x0 + ES_TEMPORAL_TILE, row, row + 1)) return true;
+    uint8_t bits = 0;
+    for (int i = 0; i < VW; i++) bits |= job->history_lit[(uint32_t)from[i] / stride * chunks + (uint32_t)from[i] % stride / ES_LIT_COLUMNS];
+    return bits & 1;
+}
 
 /* The share of the reset of each tile of a row: 0 … 1. */
 void ES_KERNEL(es_gi_temporal_compare)(const es_temporal_job* job, uint32_t tile_row, float* shares)
@@ -57,7 +68,7 @@ void ES_KERNEL(es_gi_temporal_compare)(const es_temporal_job* job, uint32_t tile
                 now[k] = vf_gather(job->source[k], at) * pi;
                 before[k] = vf_gather(job->history[k], from) * pi;
             }
-            if (job->history_count == 6)
+            if (job->history_count == 6 && lobes_count(job, tile, row, from))
                 for (int k = 0; k < 3; k++) {
                     now[k] = now[k] + vf_gather(job->source[3 + k], at);
                     before[k] = before[k] + vf_gather(job->history[3 + k], from);
@@ -123,12 +134,12 @@ VINL void neighbourhood(const float* plane, const es_gbuffer* g, uint32_t x, uin
 }
 
 /* `planes`, `with_history` are constants at every call */
-VINL void blend_row(const es_temporal_job* job, uint32_t y, const float* resets, uint32_t planes, uint32_t with_history)
+VINL void blend_row(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y, const float* resets, uint32_t planes, uint32_t with_history)
 {
     const es_gbuffer *g = job->gbuffer, *then = job->previous;
     const vf zero = vf_zero(), one = vf_set1(1.0f), row = vf_set1((float)y);
     const vf per_width = vf_set1(1.0f / (float)g->width), per_height = vf_set1(1.0f / (float)g->height), per_extent = vf_set1(1.0f / job->extent);
-    for (uint32_t x = 0; x < g->width; x += VW) {
+    for (uint32_t x = x0; x < x1; x += VW) {
         const size_t at = (size_t)y * g->stride + x;
         const vf depth = vf_load(g->depth + at);
         const vm seen = vm_gt(depth, zero);
@@ -216,12 +227,63 @@ VINL void blend_row(const es_temporal_job* job, uint32_t y, const float* resets,
     }
 }
 
+/* Of pixels [x0, x1) of row y: do what lobes reflect there, and all of its history that their movement leads to, hold zeros alone? */
+static bool lobes_are_dark(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const uint32_t chunks = es_lit_chunks(g->stride);
+    if (es_lit_within(job->source_lit, chunks, x0, x1, y, y + 1)) return false;
+    if (job->history_count < 6) return true;
+    if (!job->moving) return !es_lit_within(job->history_lit, chunks, x0, x1, y, y + 1);
+    const size_t row = (size_t)y * g->stride;
+    vf left = vf_zero(), right = left, up = left, down = left;
+    for (uint32_t x = x0; x < x1; x += VW) {
+        const vf mx = vf_load(g->motion_x + row + x), my = vf_load(g->motion_y + row + x);
+        left = vf_max(left, mx);
+        right = vf_min(right, mx);
+        up = vf_max(up, my);
+        down = vf_min(down, my);
+    }
+    float reach[4] = {left[0], -right[0], up[0], -down[0]};
+    for (int i = 1; i < VW; i++) {
+        reach[0] = reach[0] < left[i] ? left[i] : reach[0];
+        reach[1] = reach[1] < -right[i] ? -right[i] : reach[1];
+        reach[2] = reach[2] < up[i] ? up[i] : reach[2];
+        reach[3] = reach[3] < -down[i] ? -down[i] : reach[3];
+    }
+    uint32_t r[4];
+    for (int i = 0; i < 4; i++) {
+        if (!(reach[i] < 64.0f)) return false;
+        r[i] = reach[i] > 0.0f ? (uint32_t)reach[i] + 2 : 1; /* a tap beyond, and rounding */
+    }
+    return !es_lit_within(job->history_lit, chunks, x0 > r[0] ? x0 - r[0] : 0, x1 + r[1], y > r[2] ? y - r[2] : 0, y + r[3] + 1 < g->height ? y + r[3] + 1 : g->height);
+}
+
+/* A chunk at a time: three planes where lobes are dark, and zeros for the others unless they are there. */
+static void blend_chunks(const es_temporal_job* job, uint32_t y, const float* resets)
+{
+    const es_gbuffer* g = job->gbuffer;
+    uint8_t* lit = job->result_lit + (size_t)y * es_lit_chunks(g->stride);
+    for (uint32_t x0 = 0; x0 < g->width; x0 += ES_LIT_COLUMNS) {
+        const uint32_t x1 = x0 + ES_LIT_COLUMNS < g->width ? x0 + ES_LIT_COLUMNS : g->width;
+        const bool dark = lobes_are_dark(job, x0, x1, y);
+        if (dark) blend_row(job, x0, x1, y, resets, 3, 3);
+        else if (job->history_count == 6) blend_row(job, x0, x1, y, resets, 6, 6);
+        else blend_row(job, x0, x1, y, resets, 6, 3);
+        if (!job->result[0]) continue;
+        for (uint32_t k = 3; k < 6 && dark && lit[x0 / ES_LIT_COLUMNS] & 1; k++)
+            for (uint32_t x = x0; x < x1; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x, vf_zero());
+        lit[x0 / ES_LIT_COLUMNS] = !dark;
+    }
+}
+
 void ES_KERNEL(es_gi_temporal_blend)(const es_temporal_job* job, uint32_t row_begin, uint32_t row_end)
 {
+    const es_gbuffer* g = job->gbuffer;
     if (!job->history_count) { /* nothing to blend with */
-        const es_gbuffer* g = job->gbuffer;
         const size_t first = (size_t)row_begin * g->stride, bytes = (size_t)(row_end - row_begin) * g->stride * sizeof(float);
         for (uint32_t k = 0; k < job->plane_count && job->result[0]; k++) memcpy(job->result[k] + first, job->source[k] + first, bytes);
+        if (job->result_lit && job->result[0]) memset(job->result_lit + (size_t)row_begin * es_lit_chunks(g->stride), 1, (size_t)(row_end - row_begin) * es_lit_chunks(g->stride));
         if (job->confidence) memset(job->confidence + first, 0, bytes);
         return;
     }
@@ -229,8 +291,9 @@ void ES_KERNEL(es_gi_temporal_blend)(const es_temporal_job* job, uint32_t row_be
     for (uint32_t y = row_begin; y < row_end; y++) {
         if (job->reset) reset_row(job, y, resets);
         const float* row = job->reset ? resets : NULL;
-        if (job->plane_count == 3) blend_row(job, y, row, 3, 3);
-        else if (job->history_count == 6) blend_row(job, y, row, 6, 6);
-        else blend_row(job, y, row, 6, 3);
+        if (job->plane_count == 3) blend_row(job, 0, g->width, y, row, 3, 3);
+        else if (job->result_lit) blend_chunks(job, y, row);
+        else if (job->history_count == 6) blend_row(job, 0, g->width, y, row, 6, 6);
+        else blend_row(job, 0, g->width, y, row, 6, 3);
     }
 }
