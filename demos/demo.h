@@ -158,6 +158,7 @@ int demo_play(int count, char** arguments);
 int demo_reference(int count, char** arguments);
 int demo_compare(int count, char** arguments);
 int demo_bench(int count, char** arguments);
+int demo_soak(int count, char** arguments);
 
 /* Renders the options' frames without a window: files, hashes, statistics. */
 int demo_render_frames(const demo_options* options, bool show_progress);

@@ -43,6 +43,8 @@ static const char usage[] =
     "                                                   tables, JSON, CSV, SVG and one page, DIR/index.html\n"
     "             --threads N (2) --runs N (5) --only ROW --no-peer --quick\n"
     "             --scene NAME|FILE … --size WxH --spp N    what error and ledger look at, samples of their truths\n"
+    "  earthshine soak   --scene S|all --seconds S (3600) --threads N --no-sleep    runs scenes without a picture; exit 1 when\n"
+    "                                                   anything is no number, is lost, or gains energy\n"
     "  earthshine help | --version\n"
     "play takes render's options too; with --frames or --out it needs no window.\n";
 
@@ -60,6 +62,7 @@ static const command commands[] = {
     {"images", demo_images},
     {"compare", demo_compare},
     {"bench", demo_bench},
+    {"soak", demo_soak},
 };
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 

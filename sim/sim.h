@@ -377,8 +377,7 @@ ES_API es_result es_world_destroy_mover(es_world* world, es_mover mover);
  * up to 500 m/s. Centres are kept in double, so a pile far from zero behaves like one at zero.
  *
  * What is survived: any dt that es_world_step takes; masses 1:1000 apart, the heavy one on the light one too (beyond that it presses it out;
- * more substeps hold more);
- * bodies that begin deep inside each other (pushed apart at 3 m/s at most). What is refused, with a message: numbers that are not finite,
+ * more substeps hold more); bodies that begin deep inside each other (pushed apart at 3 m/s at most). What is refused, with a message: numbers that are not finite,
  * negative mass or density, shapes without volume where mass is asked of them. Speeds are limited to 1000 m/s, and to a turn by half a
  * circle per step. */
 
