@@ -69,6 +69,8 @@ static const char* kind_name(es_object_kind kind)
     case ES_OBJECT_CLIP: return "clip";
     case ES_OBJECT_BODY: return "body";
     case ES_OBJECT_JOINT: return "joint";
+    case ES_OBJECT_SOFT: return "soft body";
+    case ES_OBJECT_MOVER: return "mover";
     default: return "object";
     }
 }

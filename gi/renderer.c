@@ -265,12 +265,17 @@ static uint64_t scene_hash(const es_frame_inputs* in)
     return es_hash_bytes(hash, in->lights, in->light_count * sizeof *in->lights);
 }
 
-static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in)
+static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, uint32_t picture)
 {
     es_plan* plan = &r->plan;
     if (in->no_indirect) {
         es_plan_not_needed(plan, ES_PASS_VPLS, in->no_indirect);
         r->vpl_count = r->first_vpls = 0;
+        return ES_OK;
+    }
+    /* an update of stable lights is a step in time: all pictures of a frame have the first one's, whether work is skipped or not */
+    if (picture && r->settings.stable_vpls && plan->valid[ES_PASS_VPLS]) {
+        plan->stats[ES_PASS_VPLS].skipped = "the lights are those of the frame's first picture";
         return ES_OK;
     }
     es_vpl_request request = {.count = r->settings.vpls, .seed = r->settings.seed, .subsets = r->settings.interleave * r->settings.interleave, .glossy = r->settings.glossy_vpls};
@@ -453,7 +458,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     r->rays = es_pixel_rays_of_view(&r->view);
     es_result result = pass_visibility(r, in);
     if (!result) result = pass_light_views(r, in);
-    if (!result) result = pass_vpls(r, in);
+    if (!result) result = pass_vpls(r, in, picture);
     if (!result) result = pass_maps(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
     if (!result) result = es_pass_bounces(r, in);

@@ -134,9 +134,11 @@ es_result es_world_play_clip_with(es_world* world, es_clip clip, const es_clip_p
                         : !es_within(play.fade, 0, 1e6f)    ? "its fade must lie in 0 … 1e6 seconds"
                                                             : NULL;
     if (wrong) return es_fail(world->context, ES_INVALID_ARGUMENT, "clip '%.64s': %s", label(object->object.name), wrong);
+    es_fp_environment environment = es_fp_enter();
     double phase = play.start >= 0 ? (double)play.start : object->playing ? phase_at(object, world->time) : play.speed < 0 ? (double)object->duration : 0;
     es_clip_playing next = {.start = world->time, .offset = phase, .speed = play.speed, .once = play.once, .to = play.weight, .fade_start = world->time, .fade = play.fade};
     next.from = play.fade == 0 ? play.weight : object->playing ? weight_at(&object->play, world->time) : 0;
+    es_fp_leave(environment);
     object->play = next;
     object->playing = true;
     if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_PLAY_CLIP, .id = clip.id, .clip = play});
@@ -161,7 +163,9 @@ es_result es_world_stop_clip(es_world* world, es_clip clip, float fade)
     if (!object) return ES_STALE_HANDLE;
     if (!es_within(fade, 0, 1e6f)) return es_fail(world->context, ES_INVALID_ARGUMENT, "clip '%.64s': its fade must lie in 0 … 1e6 seconds", label(object->object.name));
     if (!object->playing) return ES_OK;
+    es_fp_environment environment = es_fp_enter();
     object->play.from = weight_at(&object->play, world->time);
+    es_fp_leave(environment);
     object->play.to = 0;
     object->play.fade_start = world->time;
     object->play.fade = fade;

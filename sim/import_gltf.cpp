@@ -1830,11 +1830,14 @@ class importer
         std::vector<es_gltf_physics_node> all(model.nodes.size());
         std::vector<uint32_t> in_order;
         std::set<size_t> animated;
-        for (const tinygltf::Animation& animation : model.animations) {
-            for (const tinygltf::AnimationChannel& channel : animation.channels) {
-                if (channel.target_node >= 0 && channel.target_path != "weights") { animated.insert(static_cast<size_t>(channel.target_node)); }
+        left_out before = left; /* what the channels leave out has been counted */
+        for (size_t a = 0; a < model.animations.size(); a++) {
+            for (size_t c = 0; c < model.animations[a].channels.size(); c++) {
+                channel_target target = target_of(model.animations[a].channels[c], at("animations", a) + ".channels[" + std::to_string(c) + "]");
+                if (target.kind == moved::node && target.path != ES_CLIP_WEIGHTS) { animated.insert(target.number); }
             }
         }
+        left = before;
         for (int each : order) {
             size_t n = static_cast<size_t>(each);
             es_gltf_physics_node& node = all[n];

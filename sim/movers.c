@@ -31,8 +31,10 @@ static es_result resolve(es_world* world, const es_mover_desc* desc, es_mover_de
     if (d.period == 0) d.period = 1;
     if (!es_mover_numbers_valid(&d))
         return es_fail(world->context, ES_INVALID_ARGUMENT, "mover '%.64s': it needs a type of es_mover_type, a period of 1e-3 … 1e6 seconds, an amplitude of 0 … 1 (flicker) or 0 … 1000 radians, and finite vectors within 1e9", name);
+    es_fp_environment environment = es_fp_enter();
     d.axis = es_v3_normalize(d.axis, es_v3(0, 1, 0));
     d.rotation = es_quat_normalize(d.rotation);
+    es_fp_leave(environment);
     if (d.type == ES_MOVER_FLICKER) {
         d.node = d.target = (es_node){0};
         if (!es_world_object(world, ES_OBJECT_LIGHT, d.light.id)) return ES_STALE_HANDLE;
@@ -77,10 +79,21 @@ es_result es_world_set_mover(es_world* world, es_mover mover, const es_mover_des
     es_mover_desc resolved;
     es_result result = resolve(world, desc, &resolved);
     if (result != ES_OK) return result;
-    exchange_references(world, &object->desc, &resolved);
-    object->desc = resolved;
-    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_MOVER, .id = mover.id, .mover = resolved});
+    es_mover_put(world, object, &resolved);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_MOVER, .id = mover.id, .mover = *desc});
     return ES_OK;
+}
+
+void es_mover_put(es_world* world, es_mover_object* mover, const es_mover_desc* resolved)
+{
+    exchange_references(world, &mover->desc, resolved);
+    mover->desc = *resolved;
+}
+
+bool es_mover_is_resolved(const es_mover_desc* d)
+{
+    const es_quat q = d->rotation;
+    return es_within(es_v3_dot(d->axis, d->axis), 0.99f, 1.01f) && es_within(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w, 0.99f, 1.01f);
 }
 
 es_result es_world_get_mover(const es_world* world, es_mover mover, es_mover_desc* desc)

@@ -218,9 +218,10 @@ static void visit_mover(es_world* world, state_io* io, es_mover_object* mover)
     io->good = type <= ES_MOVER_FLICKER;
     desc.type = (es_mover_type)type;
     bool light = desc.type == ES_MOVER_FLICKER;
-    io->good = io->good && es_mover_numbers_valid(&desc) && (es_slots_get(&world->slots[ES_OBJECT_LIGHT], desc.light.id) != NULL) == light &&
+    io->good = io->good && es_mover_numbers_valid(&desc) && es_mover_is_resolved(&desc) && (es_slots_get(&world->slots[ES_OBJECT_LIGHT], desc.light.id) != NULL) == light &&
                (es_slots_get(&world->slots[ES_OBJECT_NODE], desc.node.id) != NULL) == !light && (!desc.target.id || es_slots_get(&world->slots[ES_OBJECT_NODE], desc.target.id));
-    if (io->good && io->mode == APPLY) es_world_set_mover(world, (es_mover){mover->object.id}, &desc);
+    io->good = io->good && (light ? !desc.node.id && !desc.target.id : !desc.light.id);
+    if (io->good && io->mode == APPLY) es_mover_put(world, mover, &desc); /* not es_world_set_mover: what is normalised again may change its last bits */
 }
 
 /* The image is an asset; its size is in the signature of the content. */
@@ -272,7 +273,8 @@ static void visit_world(es_world* world, state_io* io)
     visit_floats(io, &settings.gravity.x, 3);
     visit_flag(io, &stepped);
     visit_u32(io, &active.id);
-    if (reading(io) && io->good) io->good = time >= 0 && time <= 1e12 && fixed_base >= 0 && fixed_base <= 1e12 && fixed_count <= 1ull << 53 && es_world_settings_resolve(world->context, &settings, &resolved) == ES_OK && (!active.id || es_slots_get(&world->slots[ES_OBJECT_CAMERA], active.id));
+    /* dynamics that lag by more than the longest step at the highest speed would have to catch up for ever */
+    if (reading(io) && io->good) io->good = time >= 0 && time <= 1e12 && fixed_base >= 0 && fixed_base <= 1e12 && fixed_count <= 1ull << 53 && time - fixed_base - (double)fixed_count * (double)settings.step <= 1001 && es_world_settings_resolve(world->context, &settings, &resolved) == ES_OK && (!active.id || es_slots_get(&world->slots[ES_OBJECT_CAMERA], active.id));
     if (io->mode == APPLY && io->good) {
         world->time = time;
         world->fixed_base = fixed_base;
@@ -362,7 +364,9 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     if (!io.good || io.at != payload_size) return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
     io = (state_io){.mode = APPLY, .bytes = payload, .size = payload_size, .good = true};
     es_recording* recording = es_recording_pause(world); /* it is one input, not those it is made of */
+    es_fp_environment environment = es_fp_enter();
     visit_world(world, &io);
+    es_fp_leave(environment);
     world->revisions.steps += 2;
     es_world_refresh(world);
     es_recording_resume(world, recording);

@@ -50,4 +50,8 @@ static inline void visit_flag(state_io* io, bool* flag)
     *flag = word == 1;
 }
 
+/* sim/movers.c: a desc as a mover keeps it, its axis and rotation of unit length */
+bool es_mover_is_resolved(const es_mover_desc* desc);
+void es_mover_put(es_world* world, es_mover_object* mover, const es_mover_desc* resolved);
+
 #endif

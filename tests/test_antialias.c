@@ -129,8 +129,46 @@ static void test_edges(void** state)
     check_edge(ES_ANTIALIAS_TEMPORAL, 16, 64, 0.2, 0.08);
 }
 
+/* Lights that go on from frame to frame do so once a frame, however many pictures it has and whether work is skipped or not. */
+static void test_stable_lights(void** state)
+{
+    (void)state;
+    enum { W = 24, H = 16, FRAMES = 4 };
+    uint32_t pictures[2][FRAMES][W * H];
+    for (int skip = 0; skip < 2; skip++) {
+        small_world w = small_world_create();
+        es_world* world;
+        assert_int_equal(es_world_create_scene(w.context, "stress", NULL, &world), ES_OK);
+        es_renderer_settings s = es_default_renderer_settings();
+        s.width = W;
+        s.height = H;
+        s.vpls = 64;
+        s.ism_points = 256;
+        s.ism_size = 32;
+        s.light_size = 32;
+        s.shadow_size = 64;
+        s.stable_vpls = true;
+        s.antialias = ES_ANTIALIAS_SUPERSAMPLE;
+        s.antialias_samples = 3;
+        s.skip = skip;
+        es_renderer* renderer;
+        assert_int_equal(es_renderer_create(w.context, &s, &renderer), ES_OK);
+        for (int i = 0; i < FRAMES; i++) {
+            uint32_t width, height;
+            assert_int_equal(es_world_step(world, i ? 1.0f / 15 : 0), ES_OK);
+            assert_int_equal(es_renderer_render(renderer, world), ES_OK);
+            memcpy(pictures[skip][i], es_renderer_display(renderer, &width, &height), sizeof pictures[skip][i]);
+        }
+        es_renderer_destroy(renderer);
+        es_world_destroy(world);
+        small_world_destroy(&w);
+    }
+    assert_memory_equal(pictures[0], pictures[1], sizeof pictures[0]);
+    assert_true(memcmp(pictures[0][0], pictures[0][FRAMES - 1], sizeof pictures[0][0]) != 0);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_places), cmocka_unit_test(test_jitter), cmocka_unit_test(test_edges)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_places), cmocka_unit_test(test_jitter), cmocka_unit_test(test_edges), cmocka_unit_test(test_stable_lights)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

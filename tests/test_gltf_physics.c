@@ -294,11 +294,32 @@ static void damaged(void** state)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) refuse(cases[i].part, cases[i].json);
 }
 
+/* What a clip moves is not left to the solver, in whichever way the clip names it. */
+static void animated(void** state)
+{
+#define MOVED(extensions, target) "{'asset':{'version':'2.0'}," extensions "'buffers':[{'byteLength':32,'uri':'data:application/octet-stream;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAAA='}]," \
+    "'bufferViews':[{'buffer':0,'byteLength':8},{'buffer':0,'byteOffset':8,'byteLength':24}]," \
+    "'accessors':[{'bufferView':0,'componentType':5126,'count':2,'type':'SCALAR','min':[0],'max':[1]},{'bufferView':1,'componentType':5126,'count':2,'type':'VEC3'}]," \
+    "'animations':[{'samplers':[{'input':0,'output':1}],'channels':[{'sampler':0,'target':{" target "}}]}]," \
+    "'nodes':[{'name':'lift','children':[1]},{'name':'load'," EXTRAS("'body':{'shape':'sphere','radius':0.5}") "},{'name':'free'," EXTRAS("'body':{'shape':'sphere','radius':0.5}") "}]}"
+    static const char* const files[] = {
+        MOVED("", "'node':0,'path':'translation'"),
+        MOVED("'extensionsUsed':['KHR_animation_pointer'],", "'path':'pointer','extensions':{'KHR_animation_pointer':{'pointer':'/nodes/0/translation'}}"),
+    };
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        es_world* world = load(files[i]);
+        assert_int_equal(state_of(world, "load").type, ES_BODY_KINEMATIC); /* its parent is moved */
+        assert_int_equal(state_of(world, "free").type, ES_BODY_DYNAMIC);
+        es_world_destroy(world);
+    }
+#undef MOVED
+}
+
 int main(void)
 {
 #ifndef ES_WITH_TINYGLTF
     return 77;
 #endif
-    const struct CMUnitTest tests[] = {cmocka_unit_test(falling), cmocka_unit_test(filters_and_triggers), cmocka_unit_test(joints), cmocka_unit_test(extras), cmocka_unit_test(cloth), cmocka_unit_test(damaged)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(falling), cmocka_unit_test(filters_and_triggers), cmocka_unit_test(joints), cmocka_unit_test(extras), cmocka_unit_test(cloth), cmocka_unit_test(animated), cmocka_unit_test(damaged)};
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

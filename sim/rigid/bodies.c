@@ -285,10 +285,12 @@ es_result es_world_set_body_pose(es_world* world, es_body body, const double pos
         return es_fail(world->context, ES_INVALID_ARGUMENT, "body '%.64s': its place must be finite and within 1e9", object->object.name ? object->object.name : "");
     es_body_wake(world, object);
     es_body_wake_neighbours(world, object);
+    es_fp_environment environment = es_fp_enter();
     es_body_place(object, position, zero_rotation(rotation) ? es_quat_identity() : es_quat_normalize(rotation));
     forget_motion(object);
     es_body_refresh_tree(world, object, es_v3(0, 0, 0));
     if (object->type == ES_BODY_DYNAMIC && object->node.id) es_node_set_pose(world, object->node, position, object->rotation);
+    es_fp_leave(environment);
     if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_BODY_POSE, .id = body.id, .place = {position[0], position[1], position[2]}, .rotation = rotation});
     return ES_OK;
 }
@@ -344,9 +346,11 @@ es_result es_world_apply_impulse(es_world* world, es_body body, es_vec3 impulse,
     if (!world) return ES_INVALID_ARGUMENT;
     es_result result;
     es_vec3 lever;
+    es_fp_environment environment = es_fp_enter();
     es_body_object* object = pushed(world, body, &impulse, at, "impulse", &lever, &result);
+    if (object) es_body_push(object, impulse, es_v3_cross(lever, impulse));
+    es_fp_leave(environment);
     if (!object) return result;
-    es_body_push(object, impulse, es_v3_cross(lever, impulse));
     es_body_wake(world, object);
     note_push(world, ES_INPUT_IMPULSE, body, impulse, at);
     return ES_OK;
@@ -357,13 +361,17 @@ es_result es_world_apply_force(es_world* world, es_body body, es_vec3 force, con
     if (!world) return ES_INVALID_ARGUMENT;
     es_result result;
     es_vec3 lever;
+    es_fp_environment environment = es_fp_enter();
     es_body_object* object = pushed(world, body, &force, at, "force", &lever, &result);
-    if (!object) return result;
-    es_vec3 sum = es_v3_add(object->force, force), torque = es_v3_add(object->torque, es_v3_cross(lever, force));
-    for (int k = 0; k < 3; k++) {
-        (&object->force.x)[k] = es_clampf((&sum.x)[k], -1e18f, 1e18f);
-        (&object->torque.x)[k] = es_clampf((&torque.x)[k], -1e24f, 1e24f);
+    if (object) {
+        es_vec3 sum = es_v3_add(object->force, force), torque = es_v3_add(object->torque, es_v3_cross(lever, force));
+        for (int k = 0; k < 3; k++) {
+            (&object->force.x)[k] = es_clampf((&sum.x)[k], -1e18f, 1e18f);
+            (&object->torque.x)[k] = es_clampf((&torque.x)[k], -1e24f, 1e24f);
+        }
     }
+    es_fp_leave(environment);
+    if (!object) return result;
     es_body_wake(world, object);
     note_push(world, ES_INPUT_FORCE, body, force, at);
     return ES_OK;

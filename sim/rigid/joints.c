@@ -271,6 +271,8 @@ void es_joints_wake(es_world* world)
 
 /* ---- state ----------------------------------------------------------------------------------------------------------------------- */
 
+static bool is_unit(es_quat q) { return es_within(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w, 0.99f, 1.01f); }
+
 void es_visit_joint(es_world* world, state_io* io, es_joint_object* joint)
 {
     es_joint_object now = *joint;
@@ -297,10 +299,12 @@ void es_visit_joint(es_world* world, state_io* io, es_joint_object* joint)
     }
     visit_flag(io, &now.broken);
     if (!reading(io) || !io->good) return;
-    io->good = check(world, d, joint->object.name ? joint->object.name : "") == ES_OK && (d->type != ES_JOINT_DISTANCE || d->length >= 0);
+    io->good = check(world, d, joint->object.name ? joint->object.name : "") == ES_OK && (d->type != ES_JOINT_DISTANCE || d->length >= 0) && is_unit(d->rotation_a) && is_unit(d->rotation_b);
     if (io->mode != APPLY || !io->good) return;
     *joint = now;
-    take_numbers(world, joint, &now.desc);
+    /* not take_numbers: a rotation that is normalised again may change its last bits */
+    set_frame(world, d->a, d->position_a, d->rotation_a, &joint->frame[0]);
+    set_frame(world, d->b, d->position_b, d->rotation_b, &joint->frame[1]);
 }
 
 void es_joint_signature(const es_joint_object* joint, uint32_t words[2])

@@ -140,9 +140,9 @@ static void read_contacts(es_world* world, state_io* io, es_contacts* contacts)
         }
         manifolds += contact.count;
         last = contact;
-        if (io->mode != APPLY) continue;
         es_contact_resolve(world, &contact);
-        contacts->list[i] = contact;
+        io->good = io->good && !(contact.sensor && contact.count); /* a sensor touches without manifolds: there is no room for any */
+        if (io->mode == APPLY) contacts->list[i] = contact;
     }
     io->good = io->good && manifolds == counts[1];
     if (io->mode != APPLY) return;

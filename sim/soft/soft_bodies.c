@@ -119,6 +119,16 @@ static es_result add_hold(es_world* world, es_soft_object* soft, const es_soft_a
     return ES_OK;
 }
 
+static void drop_hold(es_world* world, es_soft_object* soft, uint32_t particle)
+{
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < soft->hold_count; i++) {
+        if (soft->holds[i].particle == particle) release_hold(world, &soft->holds[i]);
+        else soft->holds[kept++] = soft->holds[i];
+    }
+    soft->hold_count = kept;
+}
+
 static bool fill(es_world* world, es_soft_object* soft, es_mesh_object* mesh, const es_soft_desc* desc)
 {
     es_context* context = world->context;
@@ -271,9 +281,14 @@ es_result es_world_soft_attach(es_world* world, es_soft handle, const es_soft_at
     if (!attachment) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_soft_attach: attachment must not be NULL");
     es_world_refresh(world);
     es_fp_environment environment = es_fp_enter();
+    const uint32_t before = soft->hold_count;
     es_result result = add_hold(world, soft, attachment);
-    if (result == ES_OK && !es_soft_make_anchors(world->context, soft)) result = es_context_last_result(world->context);
+    if (result == ES_OK && !es_soft_make_anchors(world->context, soft)) {
+        result = es_context_last_result(world->context);
+        if (soft->hold_count > before) drop_hold(world, soft, particle_for(world, soft, attachment->vertex)); /* the anchors have no room for it */
+    }
     es_fp_leave(environment);
+    if (result != ES_OK) return result;
     es_soft_wake(soft);
     if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_ATTACH, .id = handle.id, .attachment = *attachment});
     return result;
@@ -318,6 +333,7 @@ es_result es_world_soft_impulse(es_world* world, es_soft handle, uint32_t vertex
     if (!es_all_within(&impulse.x, 3, 1e12f)) return es_fail(world->context, ES_INVALID_ARGUMENT, "soft body '%.64s': an impulse must be finite and within 1e12 N s", label(soft->object.name));
     uint32_t particle = vertex == ES_SOFT_ALL ? 0 : particle_for(world, soft, vertex);
     if (particle == ES_SOFT_NONE) return ES_INVALID_ARGUMENT;
+    es_fp_environment environment = es_fp_enter();
     double mass = 0;
     for (uint32_t p = 0; p < soft->particle_count; p++) mass += vertex == ES_SOFT_ALL || p == particle ? (double)soft->mass[p] : 0;
     const float by[3] = {impulse.x, impulse.y, impulse.z};
@@ -326,6 +342,7 @@ es_result es_world_soft_impulse(es_world* world, es_soft handle, uint32_t vertex
         float* v = soft->velocity + 4 * (size_t)soft->layout.slot_of[p];
         for (int k = 0; k < 3; k++) v[k] = es_clampf((float)((double)v[k] + (double)by[k] / mass), -ES_SOFT_SPEED, ES_SOFT_SPEED);
     }
+    es_fp_leave(environment);
     es_soft_wake(soft);
     if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_IMPULSE, .id = handle.id, .vertex = vertex, .a = impulse});
     return ES_OK;

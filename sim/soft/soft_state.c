@@ -46,10 +46,12 @@ static uint32_t visit_topology(es_soft_object* soft, state_io* io)
         soft->cut = cut;
     }
     if (!cut) return count;
+    bool gone = false; /* the triangle: all of its corners */
     for (size_t i = 0; i < 3 * (size_t)soft->triangle_count && (io->good || !reading(io)); i++) {
         uint32_t corner = soft->corners[i];
         visit_u32(io, &corner);
-        if (reading(io)) io->good = io->good && (corner == ES_SOFT_NONE || corner < count);
+        if (i % 3 == 0) gone = corner == ES_SOFT_NONE;
+        if (reading(io)) io->good = io->good && (gone ? corner == ES_SOFT_NONE : corner < count);
         if (apply && io->good) soft->corners[i] = corner;
     }
     for (uint32_t p = 0; p < count && (io->good || !reading(io)); p++) {

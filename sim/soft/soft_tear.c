@@ -127,11 +127,24 @@ static void tear(es_soft_object* soft, uint32_t a, uint32_t b)
     if (!part(soft, a, b) && !part(soft, b, a)) drop(soft, a, b);
 }
 
+/* Particles that the layout does not know go back into those they came from. */
+static void forget_new(es_soft_object* soft)
+{
+    const uint32_t known = soft->carried, first = soft->first_particles;
+    for (size_t i = 0; i < 3 * (size_t)soft->triangle_count; i++)
+        if (soft->corners[i] != ES_SOFT_NONE && soft->corners[i] >= known) soft->corners[i] = soft->parent[soft->corners[i] - first];
+    for (uint32_t p = known; p < soft->particle_count; p++) soft->mass[soft->parent[p - first]] += soft->mass[p];
+    soft->particle_count = known;
+}
+
 /* Everything that follows from the topology, anew. */
 bool es_soft_retopologize(es_world* world, es_soft_object* soft)
 {
     const uint32_t known = soft->carried;
-    if (!es_soft_lay_out(world->context, soft)) return false;
+    if (!es_soft_lay_out(world->context, soft)) {
+        forget_new(soft);
+        return false;
+    }
     for (uint32_t p = known; p < soft->particle_count; p++) {
         size_t to = 4 * (size_t)soft->layout.slot_of[p], from = 4 * (size_t)soft->layout.slot_of[soft->parent[p - soft->first_particles]];
         memcpy(soft->x + to, soft->x + from, 4 * sizeof(float));
@@ -213,6 +226,7 @@ es_result es_world_soft_tear(es_world* world, es_soft soft_handle, const double 
     torn_edge* edges = es_allocate_array(world->context, most, sizeof *edges);
     if (!edges) return es_context_last_result(world->context);
     uint32_t count = 0;
+    es_fp_environment environment = es_fp_enter();
     for (uint32_t i = 0; i < soft->particle_count; i++) {
         const float* x = soft->x + 4 * (size_t)layout->slot_of[i];
         if (distance_to_segment(x, x, p) <= radius) edges[count++] = (torn_edge){i, ES_SOFT_NONE};
@@ -224,11 +238,10 @@ es_result es_world_soft_tear(es_world* world, es_soft soft_handle, const double 
         if (distance_to_segment(from, to, p) > radius || distance_to_segment(from, from, p) <= radius || distance_to_segment(to, to, p) <= radius) continue;
         edges[count++] = (torn_edge){layout->particle_of[a], layout->particle_of[b]};
     }
-    es_fp_environment environment = es_fp_enter();
     bool good = tear_edges(world, soft, edges, count);
     es_fp_leave(environment);
     es_release(world->context, edges, most * sizeof *edges);
-    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_TEAR, .id = soft_handle.id, .place = {point[0], point[1], point[2]}, .number = radius});
+    if (good && world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_TEAR, .id = soft_handle.id, .place = {point[0], point[1], point[2]}, .number = radius});
     return good ? ES_OK : es_context_last_result(world->context);
 }
 
