@@ -128,7 +128,7 @@ static void plot(player* p, int height, const char* title, const char* format, c
     ui* u = &p->ui;
     char line[96], number[32], edge[32];
     float top = ui_plot_top(ui_series_largest(series));
-    snprintf(number, sizeof number, format, (double)ui_series_at(series, 0));
+    ui_series_text(series, format, number, sizeof number);
     snprintf(edge, sizeof edge, format, (double)top);
     snprintf(line, sizeof line, "%s %s, edge %s", title, number, edge);
     ui_label(u, 0, colour, line);

@@ -2,6 +2,7 @@
 #include "ui_plot.h"
 
 #include <math.h>
+#include <stdio.h>
 
 void ui_series_add(ui_series* series, float value)
 {
@@ -13,6 +14,13 @@ void ui_series_add(ui_series* series, float value)
 float ui_series_at(const ui_series* series, uint32_t age)
 {
     return age < series->count ? series->values[(series->next + UI_PLOT_LENGTH - 1 - age) % UI_PLOT_LENGTH] : 0;
+}
+
+void ui_series_text(const ui_series* series, const char* format, char* text, size_t size)
+{
+    float newest = ui_series_at(series, 0);
+    if (series->count && isfinite(newest)) snprintf(text, size, format, (double)newest);
+    else snprintf(text, size, "-");
 }
 
 float ui_series_largest(const ui_series* series)

@@ -4,6 +4,8 @@
 
 #include "canvas.h"
 
+#include <stddef.h>
+
 enum { UI_PLOT_LENGTH = 240 };
 
 typedef struct ui_series {
@@ -14,6 +16,8 @@ typedef struct ui_series {
 void ui_series_add(ui_series* series, float value);
 /* age 0 is the newest; 0 where there is none. */
 float ui_series_at(const ui_series* series, uint32_t age);
+/* The newest by a format of one double; "-" where there is none or it is not finite: not measured yet. */
+void ui_series_text(const ui_series* series, const char* format, char* text, size_t size);
 float ui_series_largest(const ui_series* series);
 float ui_series_mean(const ui_series* series);
 /* The newest at the right edge; `top` is the value at the upper edge. What is not finite is left out. */

@@ -401,7 +401,14 @@ static void test_plots(void** state)
     for (int i = 0; i < 1000; i++) ui_series_add(&series, (float)i);
     assert_int_equal(series.count, UI_PLOT_LENGTH);
     assert_true(ui_series_at(&series, 0) == 999 && ui_series_at(&series, UI_PLOT_LENGTH - 1) == 999 - UI_PLOT_LENGTH + 1 && ui_series_at(&series, UI_PLOT_LENGTH) == 0);
+    char text[32];
+    ui_series_text(&series, "%.1f ms", text, sizeof text);
+    assert_string_equal(text, "999.0 ms");
+    ui_series_text(&(ui_series){0}, "%.1f ms", text, sizeof text);
+    assert_string_equal(text, "-");
     ui_series_add(&series, NAN);
+    ui_series_text(&series, "%.1f ms", text, sizeof text);
+    assert_string_equal(text, "-");
     assert_true(ui_series_largest(&series) == 999 && isfinite(ui_series_mean(&series)));
     assert_true(ui_plot_top(0.3f) == 0.5f && ui_plot_top(1) == 1 && ui_plot_top(1200) == 2000 && ui_plot_top(0) == 1 && ui_plot_top(NAN) == 1);
     demo_canvas canvas = fresh_canvas();
