@@ -40,7 +40,7 @@ static void add_toy(es_scene_builder* builder, const char* name, es_vec3 place, 
 /* Closed, the hooks are spread over the doorway; open, they crowd at its far side. It opens and closes once in twelve seconds. */
 static void add_hooks(es_scene_builder* builder, es_node hooks[HOOKS])
 {
-    static const float times[KEYS] = {0, 0.8f, 3.6f, 7.4f, 12};
+    static const float times[KEYS] = {0, 0.2f, 2.8f, 7.4f, 12};
     static const float opened[KEYS] = {0, 0, 1, 1, 0};
     float values[HOOKS][KEYS * 3];
     es_clip_channel channels[HOOKS];
