@@ -30,7 +30,9 @@ static es_result fixed_step(es_world* world)
     pose_at(world, es_fixed_time(world));
     es_nodes_refresh(world);
     es_result result = es_rigid_step(world, world->settings.step, world->settings.substeps);
-    return result == ES_OK ? es_soft_step(world, world->settings.step, world->settings.substeps) : result;
+    if (result == ES_OK) return es_soft_step(world, world->settings.step, world->settings.substeps);
+    world->fixed_count--; /* bodies are as they were: the next call makes the step */
+    return result;
 }
 
 float es_step_phase(const es_world* world)
