@@ -223,12 +223,22 @@ static es_result spread(es_context* context, es_scene_points* points, const es_r
 
 /* ---- memory ------------------------------------------------------------------------------------------------------------------------ */
 
+/* A set of points may begin anywhere, and its last vector reads on past its end: coordinates are followed by zeros. */
+enum { PADDING = 16 };
+
+static float* allocate_coordinates(es_context* context, size_t total)
+{
+    float* values = es_allocate_array(context, total + PADDING, sizeof *values);
+    if (values) memset(values + total, 0, PADDING * sizeof *values);
+    return values;
+}
+
 static void free_places(es_context* context, es_scene_points* points)
 {
     size_t total = (size_t)points->subset_size * points->subset_count;
-    es_release(context, points->x, total * sizeof(float));
-    es_release(context, points->y, total * sizeof(float));
-    es_release(context, points->z, total * sizeof(float));
+    es_release(context, points->x, (total + PADDING) * sizeof(float));
+    es_release(context, points->y, (total + PADDING) * sizeof(float));
+    es_release(context, points->z, (total + PADDING) * sizeof(float));
     es_release(context, points->triangle, total * sizeof(uint32_t));
     es_release(context, points->barycentric, total * sizeof(uint32_t));
     points->x = points->y = points->z = NULL;
@@ -243,8 +253,8 @@ static es_result allocate_places(es_context* context, es_scene_points* points, u
     size_t total = (size_t)subset_size * subset_count;
     points->subset_size = subset_size;
     points->subset_count = subset_count;
-    bool all = (points->x = es_allocate_array(context, total, sizeof(float))) && (points->y = es_allocate_array(context, total, sizeof(float))) &&
-        (points->z = es_allocate_array(context, total, sizeof(float))) && (points->triangle = es_allocate_array(context, total, sizeof(uint32_t))) &&
+    bool all = (points->x = allocate_coordinates(context, total)) && (points->y = allocate_coordinates(context, total)) &&
+        (points->z = allocate_coordinates(context, total)) && (points->triangle = es_allocate_array(context, total, sizeof(uint32_t))) &&
         (points->barycentric = es_allocate_array(context, total, sizeof(uint32_t)));
     if (all) return ES_OK;
     free_places(context, points);

@@ -64,7 +64,7 @@ es_result es_recording_save(const es_recording* recording, const char* path)
     errno = 0;
     FILE* file = fopen(temporary, "wb");
     bool good = file && fwrite(&header, sizeof header, 1, file) == 1;
-    for (int i = 0; i < PARTS && good; i++) good = fwrite(parts[i].bytes, 1, parts[i].size, file) == parts[i].size;
+    for (int i = 0; i < PARTS && good; i++) good = !parts[i].size || fwrite(parts[i].bytes, 1, parts[i].size, file) == parts[i].size;
     if (file) good = fclose(file) == 0 && good;
     good = good && rename(temporary, path) == 0;
     es_result result = good ? ES_OK : es_fail(context, ES_FILE_WRITE, "cannot write '%s': %s", path, strerror(errno ? errno : EIO));
@@ -126,7 +126,7 @@ static es_result read_parts(es_context* context, FILE* file, const char* path, c
     part parts[PARTS];
     parts_of(r, h, parts);
     bool good = true;
-    for (int i = 0; i < PARTS && good; i++) good = fread(parts[i].bytes, 1, parts[i].size, file) == parts[i].size;
+    for (int i = 0; i < PARTS && good; i++) good = !parts[i].size || fread(parts[i].bytes, 1, parts[i].size, file) == parts[i].size;
     good = good && payload_of(h, parts) == h->payload && !memchr(r->scene, 0, (size_t)h->scene_size) && !memchr(r->settings, 0, (size_t)h->settings_size) && content_valid(r);
     if (good) {
         *out = r;
