@@ -21,6 +21,7 @@ static inline bool reading(const state_io* io) { return io->mode >= CHECK; }
 
 static inline void transfer(state_io* io, void* data, size_t size)
 {
+    if (!size) return; /* of what has no elements there may be no array */
     if (reading(io) && (!io->good || size > io->size - io->at)) {
         io->good = false;
         return;
