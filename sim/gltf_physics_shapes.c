@@ -67,7 +67,7 @@ static es_result implicit_shape(const es_gltf_loader* l, int32_t number, const c
         shape->type = ES_SHAPE_BOX;
         shape->half_extents = es_v3(0.5f * size[0] * scale.x, 0.5f * size[1] * scale.y, 0.5f * size[2] * scale.z);
     } else {
-        float height = type == 2 ? 0.5f : 0.5f, bottom = 0.25f, top = 0.25f;
+        float height = 0.5f, bottom = 0.25f, top = 0.25f;
         ES_GLTF_TRY(es_gltf_number(l, sizes, "height", 1e-6, 1e5, place, &height));
         ES_GLTF_TRY(es_gltf_number(l, sizes, "radiusBottom", 0, 1e5, place, &bottom));
         ES_GLTF_TRY(es_gltf_number(l, sizes, "radiusTop", 0, 1e5, place, &top));
