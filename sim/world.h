@@ -171,8 +171,8 @@ struct es_world {
 
 /* ---- asking about arguments: OK, or a failure with its message ---------------------------------------------------- */
 
-static inline bool es_finite(float x) { return x - x == 0.0f; }
-static inline bool es_within(float x, float low, float high) { return x >= low && x <= high; } /* false for NaN */
+/* False for NaN, and quietly: a caller's NaN is an argument to refuse, which `>=` would make an invalid operation of. */
+static inline bool es_within(float x, float low, float high) { return __builtin_isgreaterequal(x, low) && __builtin_islessequal(x, high); }
 bool es_all_within(const float* values, size_t count, float limit);
 /* The object or NULL after a message. */
 void* es_world_object(const es_world* world, es_object_kind kind, uint32_t id);
