@@ -227,6 +227,17 @@ VINL void blend_row(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32
     }
 }
 
+/* By the planes that are blended and those of them that have history; once each, as both callers below need them. */
+#define ES_BLEND_(name, planes, with_history)                                                                                              \
+    static __attribute__((noinline)) void name(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y, const float* resets)       \
+    {                                                                                                                                      \
+        blend_row(job, x0, x1, y, resets, planes, with_history);                                                                           \
+    }
+ES_BLEND_(blend_diffuse, 3, 3)
+ES_BLEND_(blend_both, 6, 6)
+ES_BLEND_(blend_new_lobes, 6, 3)
+#undef ES_BLEND_
+
 /* Of pixels [x0, x1) of row y: do what lobes reflect there, and all of its history that their movement leads to, hold zeros alone? */
 static bool lobes_are_dark(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y)
 {
@@ -267,9 +278,9 @@ static void blend_chunks(const es_temporal_job* job, uint32_t y, const float* re
     for (uint32_t x0 = 0; x0 < g->width; x0 += ES_LIT_COLUMNS) {
         const uint32_t x1 = x0 + ES_LIT_COLUMNS < g->width ? x0 + ES_LIT_COLUMNS : g->width;
         const bool dark = lobes_are_dark(job, x0, x1, y);
-        if (dark) blend_row(job, x0, x1, y, resets, 3, 3);
-        else if (job->history_count == 6) blend_row(job, x0, x1, y, resets, 6, 6);
-        else blend_row(job, x0, x1, y, resets, 6, 3);
+        if (dark) blend_diffuse(job, x0, x1, y, resets);
+        else if (job->history_count == 6) blend_both(job, x0, x1, y, resets);
+        else blend_new_lobes(job, x0, x1, y, resets);
         if (!job->result[0]) continue;
         for (uint32_t k = 3; k < 6 && dark && lit[x0 / ES_LIT_COLUMNS] & 1; k++)
             for (uint32_t x = x0; x < x1; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x, vf_zero());
@@ -291,9 +302,9 @@ void ES_KERNEL(es_gi_temporal_blend)(const es_temporal_job* job, uint32_t row_be
     for (uint32_t y = row_begin; y < row_end; y++) {
         if (job->reset) reset_row(job, y, resets);
         const float* row = job->reset ? resets : NULL;
-        if (job->plane_count == 3) blend_row(job, 0, g->width, y, row, 3, 3);
+        if (job->plane_count == 3) blend_diffuse(job, 0, g->width, y, row);
         else if (job->result_lit) blend_chunks(job, y, row);
-        else if (job->history_count == 6) blend_row(job, 0, g->width, y, row, 6, 6);
-        else blend_row(job, 0, g->width, y, row, 6, 3);
+        else if (job->history_count == 6) blend_both(job, 0, g->width, y, row);
+        else blend_new_lobes(job, 0, g->width, y, row);
     }
 }

@@ -181,6 +181,12 @@ static v3 map_normal(const surface8* s, v3 normal, const es_rgba* texel)
     return select3(usable & vm_gt(dot(mapped, mapped), vf_set1(1e-8f)), mapped, normal);
 }
 
+/* Out of line: five copies of it would take compilers most of a minute where a lane is many instructions. */
+static __attribute__((noinline)) void sample(const es_prepared_texture* texture, const es_uv* uv, const vm* active, es_rgba* texel)
+{
+    *texel = es_sample_texture(texture, uv, *active);
+}
+
 /* The planes that textures change. Out of line: most pixels of untextured scenes never come here. */
 static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32_t planes, v3* normal, v3 geometric, es_rgba* color, vi* surface, vi* emission)
 {
@@ -192,14 +198,15 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
         for (int i = 0; i < ES_TEXTURE_COUNT; i++) used |= textures[i].image && (textures[i].uv_set != 0) == (set != 0);
         if (used) uv[set] = interpolate_uv(s, set);
     }
-#define ES_SAMPLE_(which) es_sample_texture(&textures[which], &uv[textures[which].uv_set ? 1 : 0], s->active)
+#define ES_SAMPLE_(which) sample(&textures[which], &uv[textures[which].uv_set ? 1 : 0], &s->active, &texel)
+    es_rgba texel;
     if ((planes & ES_GBUFFER_NORMAL) && textures[ES_TEXTURE_NORMAL].image) {
-        es_rgba texel = ES_SAMPLE_(ES_TEXTURE_NORMAL);
+        ES_SAMPLE_(ES_TEXTURE_NORMAL);
         v3 n = select3(directed(*normal), *normal, geometric);
         *normal = map_normal(s, unit(n), &texel);
     }
     if ((planes & ES_GBUFFER_ALBEDO) && textures[ES_TEXTURE_BASE_COLOR].image) {
-        es_rgba texel = ES_SAMPLE_(ES_TEXTURE_BASE_COLOR);
+        ES_SAMPLE_(ES_TEXTURE_BASE_COLOR);
         color->r = color->r * texel.r;
         color->g = color->g * texel.g;
         color->b = color->b * texel.b;
@@ -207,16 +214,19 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
     if ((planes & ES_GBUFFER_SURFACE) && (textures[ES_TEXTURE_METALLIC_ROUGHNESS].image || textures[ES_TEXTURE_SPECULAR].image)) {
         vf metallic = vf_set1(material->metallic), roughness = vf_set1(material->roughness), specular = vf_set1(material->specular);
         if (textures[ES_TEXTURE_METALLIC_ROUGHNESS].image) {
-            es_rgba texel = ES_SAMPLE_(ES_TEXTURE_METALLIC_ROUGHNESS);
+            ES_SAMPLE_(ES_TEXTURE_METALLIC_ROUGHNESS);
             roughness = roughness * texel.g;
             metallic = metallic * texel.b;
         }
-        if (textures[ES_TEXTURE_SPECULAR].image) specular = specular * ES_SAMPLE_(ES_TEXTURE_SPECULAR).a;
+        if (textures[ES_TEXTURE_SPECULAR].image) {
+            ES_SAMPLE_(ES_TEXTURE_SPECULAR);
+            specular = specular * texel.a;
+        }
         vi second = material->model == ES_SURFACE_PHONG ? vi_set1((int32_t)(material->surface_word >> 8 & 0xff)) : es_pack_unorm8_v(roughness);
         *surface = es_pack_unorm8_v(metallic) | (second << 8) | (es_pack_unorm8_v(specular) << 16) | vi_set1((int32_t)(material->model << 24));
     }
     if ((planes & ES_GBUFFER_EMISSION) && textures[ES_TEXTURE_EMISSION].image) {
-        es_rgba texel = ES_SAMPLE_(ES_TEXTURE_EMISSION);
+        ES_SAMPLE_(ES_TEXTURE_EMISSION);
         *emission = es_pack_rgb9e5_v(vf_set1(material->emission[0]) * texel.r, vf_set1(material->emission[1]) * texel.g, vf_set1(material->emission[2]) * texel.b);
     }
 #undef ES_SAMPLE_

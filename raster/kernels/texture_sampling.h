@@ -111,18 +111,18 @@ VINL es_rgba es_sample_texture(const es_prepared_texture* texture, const es_uv* 
     lambda = vf_min(vf_max(lambda, vf_zero()), vf_set1((float)(image->level_count - 1)));
 
     es_rgba sum = {vf_zero(), vf_zero(), vf_zero(), vf_zero()};
-    vf scale = vf_set1(1.0f / 65535.0f);
-    if (texture->mip == ES_MIP_NONE || image->level_count == 1) {
-        es_sample_level(texture, u, v, vi_zero(), linear, scale, &sum);
-    } else if (texture->mip == ES_MIP_NEAREST) {
-        es_sample_level(texture, u, v, vi_truncate(lambda + vf_set1(0.5f)), linear, scale, &sum);
-    } else {
+    vf scale = vf_set1(1.0f / 65535.0f), finer = scale, coarser = vf_zero(); /* weights of a level and the next */
+    vi level = vi_zero();
+    if (texture->mip == ES_MIP_NEAREST && image->level_count > 1) {
+        level = vi_truncate(lambda + vf_set1(0.5f));
+    } else if (texture->mip != ES_MIP_NONE && image->level_count > 1) {
         vf base = vf_floor(lambda), t = lambda - base;
-        vi level = vi_truncate(base);
-        es_sample_level(texture, u, v, level, linear, (vf_set1(1.0f) - t) * scale, &sum);
-        vm between = vm_gt(t, vf_zero());
-        if (vm_any(between)) es_sample_level(texture, u, v, vi_min(level + vi_set1(1), vi_set1((int32_t)image->level_count - 1)), linear, t * scale, &sum);
+        level = vi_truncate(base);
+        finer = (vf_set1(1.0f) - t) * scale;
+        coarser = t * scale;
     }
+    es_sample_level(texture, u, v, level, linear, finer, &sum);
+    if (vm_any(vm_gt(coarser, vf_zero()))) es_sample_level(texture, u, v, vi_min(level + vi_set1(1), vi_set1((int32_t)image->level_count - 1)), linear, coarser, &sum);
     return sum;
 }
 
