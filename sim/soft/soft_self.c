@@ -14,55 +14,66 @@ typedef struct pair_search {
     es_soft_object* soft;
     float cell, reach2, rest2;
     uint32_t mask;
-    uint32_t *first, *sorted;      /* of cells; slots */
+    uint32_t *first, *sorted;      /* of buckets; slots */
     uint32_t* count;               /* per slot: how many, then where */
     bool fill;
 } pair_search;
 
+typedef struct cell { int32_t x, y, z; } cell;
+
 float es_soft_own_distance(const es_soft_object* soft) { return es_maxf(soft->desc.thickness, 0.75f * soft->spacing); }
 
-static int32_t cell_at(float x, float cell)
+static cell cell_of(const float* x, float size)
 {
-    float at = es_floor(es_clampf(x / cell, -1e9f, 1e9f));
-    return (int32_t)at;
+    return (cell){(int32_t)es_floor(es_clampf(x[0] / size, -1e9f, 1e9f)), (int32_t)es_floor(es_clampf(x[1] / size, -1e9f, 1e9f)), (int32_t)es_floor(es_clampf(x[2] / size, -1e9f, 1e9f))};
 }
 
-static uint32_t hash_cell(int32_t x, int32_t y, int32_t z) { return es_hash_u32((uint32_t)x * 0x9e3779b1u ^ (uint32_t)y * 0x85ebca77u ^ (uint32_t)z * 0xc2b2ae3du); }
+/* Cells in a row along x have buckets in a row, so that three of them are read at once. */
+static uint32_t bucket_of(int32_t x, int32_t y, int32_t z) { return (uint32_t)x + es_hash_u32((uint32_t)y * 0x85ebca77u ^ (uint32_t)z * 0xc2b2ae3du); }
+
+/* Of those in the buckets [begin, end) the ones in row (y, z), three cells about x, that come near enough. Other cells have the same buckets;
+ * what is in them is left to its own row, so that none is found twice. */
+static uint32_t search_buckets(const pair_search* search, uint32_t s, uint32_t begin, uint32_t end, cell at, uint32_t pairs, uint32_t found)
+{
+    es_soft_object* soft = search->soft;
+    const float *x = soft->x + 4 * (size_t)s, *rest = soft->rest + 3 * (size_t)soft->layout.particle_of[s];
+    for (uint32_t i = search->first[begin]; i < search->first[end]; i++) {
+        const uint32_t t = search->sorted[i];
+        if (t <= s) continue;
+        const float* y = soft->x + 4 * (size_t)t;
+        float dx = x[0] - y[0], dy = x[1] - y[1], dz = x[2] - y[2];
+        if (!(dx * dx + dy * dy + dz * dz < search->reach2) || !(x[3] + y[3] > 0)) continue;
+        const float* other = soft->rest + 3 * (size_t)soft->layout.particle_of[t];
+        float rx = rest[0] - other[0], ry = rest[1] - other[1], rz = rest[2] - other[2];
+        if (rx * rx + ry * ry + rz * rz < search->rest2) continue;
+        const cell there = cell_of(y, search->cell);
+        if (there.y != at.y || there.z != at.z || there.x < at.x - 1 || there.x > at.x + 1) continue;
+        if (search->fill) {
+            uint32_t place = pairs + found;
+            for (; place > pairs && soft->pairs[2 * (size_t)place - 1] > t; place--) soft->pairs[2 * (size_t)place + 1] = soft->pairs[2 * (size_t)place - 1];
+            soft->pairs[2 * (size_t)place + 1] = t;
+            soft->pairs[2 * (size_t)(pairs + found)] = s;
+        }
+        found++;
+    }
+    return found;
+}
 
 static void search_body(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const pair_search* search = user;
     es_soft_object* soft = search->soft;
+    const uint32_t buckets = search->mask + 1;
     for (uint32_t s = begin; s < end; s++) {
-        uint32_t found = 0, at = search->fill ? search->count[s] : 0;
+        uint32_t found = 0, pairs = search->fill ? search->count[s] : 0;
         if (soft->layout.particle_of[s] != ES_SOFT_NONE) {
-            const float* x = soft->x + 4 * (size_t)s;
-            const float* rest = soft->rest + 3 * (size_t)soft->layout.particle_of[s];
-            int32_t c[3];
-            for (int k = 0; k < 3; k++) c[k] = cell_at(x[k], search->cell);
-            uint32_t visited[27], visits = 0;
-            for (int32_t n = 0; n < 27; n++) {
-                uint32_t bucket = hash_cell(c[0] + n % 3 - 1, c[1] + n / 3 % 3 - 1, c[2] + n / 9 - 1) & search->mask;
-                bool again = false; /* two cells of one bucket */
-                for (uint32_t k = 0; k < visits; k++) again |= visited[k] == bucket;
-                if (again) continue;
-                visited[visits++] = bucket;
-                for (uint32_t i = search->first[bucket]; i < search->first[bucket + 1]; i++) {
-                    uint32_t t = search->sorted[i];
-                    if (t <= s) continue;
-                    const float *y = soft->x + 4 * (size_t)t, *other = soft->rest + 3 * (size_t)soft->layout.particle_of[t];
-                    float dx = x[0] - y[0], dy = x[1] - y[1], dz = x[2] - y[2];
-                    if (!(dx * dx + dy * dy + dz * dz < search->reach2) || !(x[3] + y[3] > 0)) continue;
-                    float rx = rest[0] - other[0], ry = rest[1] - other[1], rz = rest[2] - other[2];
-                    if (rx * rx + ry * ry + rz * rz < search->rest2) continue;
-                    if (search->fill) {
-                        uint32_t place = at + found;
-                        for (; place > at && soft->pairs[2 * (size_t)place - 1] > t; place--) soft->pairs[2 * (size_t)place + 1] = soft->pairs[2 * (size_t)place - 1];
-                        soft->pairs[2 * (size_t)place + 1] = t;
-                        soft->pairs[2 * (size_t)(at + found)] = s;
-                    }
-                    found++;
-                }
+            const cell own = cell_of(soft->x + 4 * (size_t)s, search->cell);
+            for (int32_t n = 0; n < 9; n++) {
+                const cell row = {own.x, own.y + n % 3 - 1, own.z + n / 3 - 1};
+                const uint32_t first = bucket_of(row.x - 1, row.y, row.z) & search->mask;
+                const uint32_t end_of_row = first + 3 < buckets ? first + 3 : buckets;
+                found = search_buckets(search, s, first, end_of_row, row, pairs, found);
+                if (first + 3 > buckets) found = search_buckets(search, s, 0, first + 3 - buckets, row, pairs, found); /* the row goes on at the front */
             }
         }
         if (!search->fill) search->count[s] = found;
@@ -89,8 +100,8 @@ bool es_soft_find_pairs(es_context* context, es_soft_object* soft, float h)
     for (int pass = 0; pass < 2; pass++) {
         for (uint32_t s = 0; s < slots; s++) {
             if (soft->layout.particle_of[s] == ES_SOFT_NONE) continue;
-            const float* x = soft->x + 4 * (size_t)s;
-            uint32_t bucket = hash_cell(cell_at(x[0], reach), cell_at(x[1], reach), cell_at(x[2], reach)) & search.mask;
+            const cell at = cell_of(soft->x + 4 * (size_t)s, reach);
+            const uint32_t bucket = bucket_of(at.x, at.y, at.z) & search.mask;
             if (pass == 0) search.first[bucket + 2]++;
             else search.sorted[search.first[bucket + 1]++] = s;
         }
