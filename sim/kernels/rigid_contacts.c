@@ -356,7 +356,10 @@ void ES_KERNEL(es_sim_contacts_relax)(const es_solver_job* job, uint32_t begin, 
     for (uint32_t i = begin; i < end; i++) solve(job, &job->contacts[i], false);
 }
 
-/* Where bodies met fast enough and pressed: they part at `restitution` times that speed. */
+/* Where bodies met fast enough and pressed: they part at `restitution` times that speed. One point's impulse changes the speed of the others
+ * of its manifold, so they take turns until all have theirs: only then a bounce without loss keeps the energy, and gains none. */
+enum { BOUNCE_ROUNDS = 4 };
+
 void ES_KERNEL(es_sim_contacts_bounce)(const es_solver_job* job, uint32_t begin, uint32_t end)
 {
     const vf zero = vf_zero();
@@ -367,8 +370,9 @@ void ES_KERNEL(es_sim_contacts_bounce)(const es_solver_job* job, uint32_t begin,
         motion a = gather(records, vi_load(c->a)), b = gather(records, vi_load(c->b));
         const vf mass_a = vf_load(c->mass_a), mass_b = vf_load(c->mass_b), restitution = vf_load(c->restitution);
         const v3 n = load3(&c->normal);
-        for (uint32_t k = 0; k < c->point_count; k++) {
-            es_wide_point* p = &c->points[k];
+        const uint32_t turns = c->point_count > 1 ? c->point_count * BOUNCE_ROUNDS : 1;
+        for (uint32_t turn = 0; turn < turns; turn++) {
+            es_wide_point* p = &c->points[turn % c->point_count];
             vf approach = vf_load(p->approach), old = vf_load(p->impulse);
             vm bounces = vm_gt(restitution, zero) & vm_lt(approach, vf_set1(-ES_BOUNCE_SPEED)) & vm_gt(vf_load(p->peak), zero);
             vf speed = dot(n, sub(b.v, a.v)) + dot(load3(&p->arm_b), b.w) - dot(load3(&p->arm_a), a.w);

@@ -9,7 +9,7 @@
 #include "sim/rigid/crew.h"
 #include "sim/rigid/joints.h"
 
-enum { RECORD_GRAIN = 64, CONTACT_GRAIN = 4, CONTACT_HERTZ = 30, CONTACT_DAMPING = 1, BURDEN_DAMPING = 4, BURDEN = 60 };
+enum { RECORD_GRAIN = 64, CONTACT_GRAIN = 4, CONTACT_HERTZ = 30, CONTACT_DAMPING = 1, BURDEN_DAMPING = 4, BURDEN = 60, BOUNCE_ROUNDS = 4 };
 
 typedef enum stage_kind { LOAD, PREPARE, PREPARE_JOINTS, ACCELERATE, WARM_JOINTS, WARM, SOLVE_JOINTS, SOLVE, MOVE, RELAX_JOINTS, RELAX, BOUNCE, STORE_JOINTS, STORE, UNLOAD } stage_kind;
 
@@ -258,7 +258,7 @@ static void plan(es_solver* solver, uint32_t substeps)
         add_stage(solver, RELAX_JOINTS, 0, joints, 1);
         add_contacts(solver, RELAX);
     }
-    if (solver->bouncy) add_contacts(solver, BOUNCE);
+    for (uint32_t round = 0; round < BOUNCE_ROUNDS && solver->bouncy; round++) add_contacts(solver, BOUNCE);
     add_stage(solver, STORE_JOINTS, 0, joints, 1);
     add_stage(solver, STORE, 0, wide, CONTACT_GRAIN);
     add_stage(solver, UNLOAD, 0, bodies->count, RECORD_GRAIN);
@@ -308,7 +308,7 @@ static bool reserve(es_solver* solver, uint32_t substeps)
     const es_rigid* rigid = world->rigid;
     size_t records = ((size_t)solver->job.bodies.still + ES_LANES) / ES_LANES * ES_LANES, manifolds = 0;
     for (size_t i = 0; i < rigid->contacts.count; i++) manifolds += rigid->contacts.list[i].count;
-    size_t stages = 16 + (size_t)(substeps + 1) * (5 + 3 * (ES_COLOURS + 1));
+    size_t stages = 16 + (size_t)(substeps + 1) * (5 + 3 * (ES_COLOURS + 1)) + (size_t)BOUNCE_ROUNDS * (ES_COLOURS + 1);
     return es_grow(context, (void**)&solver->velocity, &solver->velocity_capacity, 0, 8 * records, sizeof(float)) &&
            es_grow(context, (void**)&solver->moved, &solver->moved_capacity, 0, 8 * records, sizeof(float)) &&
            es_grow(context, (void**)&solver->mass, &solver->mass_capacity, 0, 8 * records, sizeof(float)) &&
