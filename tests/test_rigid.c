@@ -185,6 +185,35 @@ static void events_tell_who_meets_and_parts(void** unused)
     free_arena(&a);
 }
 
+/* What bounces within one step, from before it touched to after, has touched. */
+static void a_fast_bounce_is_an_event(void** unused)
+{
+    for (int speed = 2; speed <= 200; speed *= 10) {
+        arena a = make_arena(1, 0, true);
+        set_gravity(&a, 0, 0, 0);
+        es_body wall = add_floor(&a);
+        es_shape_desc ball = ball_shape(0.25f);
+        ball.restitution = 1;
+        es_body body = add_body(&a, ES_BODY_DYNAMIC, &ball, 0, 2, 0, no_turn);
+        assert_int_equal(es_world_set_body_velocity(a.world, body, (es_vec3){0, (float)-speed, 0}, (es_vec3){0, 0, 0}), ES_OK);
+        int entered = 0, left = 0;
+        for (int i = 0; i < 120; i++) {
+            step(&a, 1);
+            size_t count;
+            const es_contact_event* events = es_world_contact_events(a.world, &count);
+            for (size_t k = 0; k < count; k++) {
+                assert_true((events[k].a.id == wall.id && events[k].b.id == body.id) || (events[k].a.id == body.id && events[k].b.id == wall.id));
+                events[k].enter ? entered++ : left++;
+                if (events[k].enter) assert_true(fabs((double)events[k].speed - speed) < 0.01 * speed);
+            }
+        }
+        assert_true(state_of(&a, body).velocity.y > 0.99f * (float)speed);
+        assert_int_equal(entered, 1);
+        assert_int_equal(left, 1);
+        free_arena(&a);
+    }
+}
+
 /* What numbers may not be, and what happens instead of a crash. */
 static void bad_input_is_refused(void** unused)
 {
@@ -355,6 +384,7 @@ int main(void)
         cmocka_unit_test(deep_overlaps_part_gently),
         cmocka_unit_test(far_from_zero_it_is_the_same),
         cmocka_unit_test(events_tell_who_meets_and_parts),
+        cmocka_unit_test(a_fast_bounce_is_an_event),
         cmocka_unit_test(bad_input_is_refused),
         cmocka_unit_test(extremes_are_survived),
         cmocka_unit_test(fast_bodies_do_not_pass_walls),

@@ -248,6 +248,18 @@ es_result es_world_destroy_body(es_world* world, es_body body)
 
 /* ---- asking ---------------------------------------------------------------------------------------------------------------- */
 
+/* 1/2 m v² + 1/2 ω·Iω, with ω in the body's axes, where I is kept. */
+static float kinetic_energy(const es_body_object* object)
+{
+    if (object->type != ES_BODY_DYNAMIC) return 0;
+    const es_vec3 v = object->velocity, w = es_quat_rotate((es_quat){-object->rotation.x, -object->rotation.y, -object->rotation.z, object->rotation.w}, object->angular_velocity);
+    const float* i = object->inertia;
+    const double x = (double)w.x, y = (double)w.y, z = (double)w.z;
+    double twice = (double)object->mass * ((double)v.x * (double)v.x + (double)v.y * (double)v.y + (double)v.z * (double)v.z);
+    twice += (double)i[0] * x * x + (double)i[1] * y * y + (double)i[2] * z * z + 2 * ((double)i[3] * x * y + (double)i[4] * x * z + (double)i[5] * y * z);
+    return (float)(0.5 * twice);
+}
+
 es_result es_world_get_body(const es_world* world, es_body body, es_body_state* state)
 {
     if (!world || !state) return ES_INVALID_ARGUMENT;
@@ -262,6 +274,7 @@ es_result es_world_get_body(const es_world* world, es_body body, es_body_state* 
         .velocity = object->velocity,
         .angular_velocity = object->angular_velocity,
         .mass = object->mass,
+        .kinetic_energy = kinetic_energy(object),
         .linear_damping = object->linear_damping,
         .angular_damping = object->angular_damping,
         .gravity_scale = object->gravity_scale,

@@ -23,6 +23,14 @@ static void carry_over(es_contact_manifold* m, const es_contact_manifold* old, u
     }
 }
 
+static es_vec3 speed_at(const es_body_object* body, es_vec3 arm) { return es_v3_add(body->velocity, es_v3_cross(body->angular_velocity, arm)); }
+
+/* At which a's point comes towards b's, m/s. */
+static float approach(const es_body_object* a, const es_body_object* b, const es_contact_manifold* m, const es_manifold_point* at)
+{
+    return es_v3_dot(es_v3_sub(speed_at(a, at->point), speed_at(b, es_v3_sub(at->point, m->apart))), m->geometry.normal);
+}
+
 static void collide(es_world* world, es_contact* contact, es_contact_manifold* manifolds, uint32_t capacity, const es_contact_manifold* old)
 {
     const es_body_object *a = es_body_of_key(world, contact->a), *b = es_body_of_key(world, contact->b);
@@ -41,9 +49,12 @@ static void collide(es_world* world, es_contact* contact, es_contact_manifold* m
         manifolds[i].geometry = found[i];
         manifolds[i].apart = apart;
         carry_over(&manifolds[i], old, old_count);
-        for (uint32_t k = 0; k < found[i].count; k++) meets |= found[i].points[k].separation <= 0;
+        for (uint32_t k = 0; k < found[i].count; k++) {
+            const es_manifold_point* point = &found[i].points[k];
+            meets |= point->separation <= es_maxf(approach(a, b, &manifolds[i], point) * world->settings.step, 0.0f);
+        }
     }
-    /* begins with surfaces that meet, ends with none within the margin: what rests does not flicker */
+    /* begins with surfaces that meet, or will within the step as far as can be told, ends with none within the margin: what rests does not flicker */
     contact->touching = contact->count > 0 && (contact->touching || meets);
 }
 
@@ -83,31 +94,28 @@ void es_report_leaving(es_world* world, const es_contact* contact)
     rigid->events[rigid->event_count++] = event_of(world, contact, false);
 }
 
-static es_vec3 speed_at(const es_body_object* body, es_vec3 arm) { return es_v3_add(body->velocity, es_v3_cross(body->angular_velocity, arm)); }
-
-static void report_entering(es_world* world, const es_contact* contact)
+static void report_entering(es_world* world, const es_contacts* contacts, const es_contact* contact)
 {
     es_rigid* rigid = world->rigid;
     es_contact_event event = event_of(world, contact, true);
     const es_body_object *a = es_body_of_key(world, contact->a), *b = es_body_of_key(world, contact->b);
     if (contact->count) {
         /* the deepest point, the first of equals */
-        const es_contact_manifold* m = &rigid->next.manifolds[contact->first];
-        const es_manifold* deepest = NULL;
+        const es_contact_manifold* m = &contacts->manifolds[contact->first];
+        const es_contact_manifold* deepest = NULL;
         const es_manifold_point* at = NULL;
         for (uint32_t i = 0; i < contact->count; i++)
             for (uint32_t k = 0; k < m[i].geometry.count; k++) {
                 const es_manifold_point* point = &m[i].geometry.points[k];
                 if (at && !(point->separation < at->separation)) continue;
                 at = point;
-                deepest = &m[i].geometry;
+                deepest = &m[i];
             }
-        event.normal = deepest->normal;
+        event.normal = deepest->geometry.normal;
         event.point[0] = a->centre[0] + (double)at->point.x;
         event.point[1] = a->centre[1] + (double)at->point.y;
         event.point[2] = a->centre[2] + (double)at->point.z;
-        es_vec3 between = es_v3_sub(speed_at(a, at->point), speed_at(b, es_v3_sub(at->point, m->apart)));
-        event.speed = es_maxf(es_v3_dot(between, event.normal), 0.0f);
+        event.speed = es_maxf(approach(a, b, deepest, at), 0.0f);
     } else {
         for (int k = 0; k < 3; k++) event.point[k] = a->centre[k];
     }
@@ -123,9 +131,24 @@ void es_report_contacts(es_world* world)
         const es_contact *old = i < now->count ? &now->list[i] : NULL, *new = j < next->count ? &next->list[j] : NULL;
         int order = !old ? 1 : !new ? -1 : old->a != new->a ? (old->a < new->a ? -1 : 1) : old->b != new->b ? (old->b < new->b ? -1 : 1) : 0;
         bool was = order <= 0 && old->touching, is = order >= 0 && new->touching;
-        if (is && !was) report_entering(world, new);
+        if (is && !was) report_entering(world, next, new);
         else if (was && !is) rigid->events[rigid->event_count++] = event_of(world, old, false);
         i += order <= 0;
         j += order >= 0;
+    }
+}
+
+void es_report_pressed(es_world* world)
+{
+    es_contacts* contacts = &world->rigid->contacts;
+    for (size_t i = 0; i < contacts->count; i++) {
+        es_contact* contact = &contacts->list[i];
+        if (contact->touching || contact->sensor) continue;
+        bool pressed = false;
+        for (uint32_t m = contact->first; m < contact->first + contact->count; m++)
+            for (uint32_t k = 0; k < contacts->manifolds[m].geometry.count; k++) pressed |= contacts->manifolds[m].geometry.points[k].normal_impulse > 0;
+        if (!pressed) continue;
+        contact->touching = true;
+        report_entering(world, contacts, contact);
     }
 }

@@ -158,6 +158,8 @@ void es_body_drop_contacts(es_world* world, es_body_object* body);
 void es_collide_contacts(es_world* world);
 /* Events of what began and ended to touch between rigid->contacts and rigid->next; room for them was made. */
 void es_report_contacts(es_world* world);
+/* After the solver: events of what it pressed together that was not expected to touch, and may be apart again when it is next looked at. */
+void es_report_pressed(es_world* world);
 void es_report_leaving(es_world* world, const es_contact* contact);
 
 /* islands.c */

@@ -151,7 +151,7 @@ static bool touch(es_world* world)
 {
     es_rigid* rigid = world->rigid;
     if (!es_find_contacts(world)) return false;
-    size_t events = rigid->event_count + rigid->contacts.count + rigid->next.count;
+    size_t events = rigid->event_count + rigid->contacts.count + rigid->next.count; /* es_report_pressed's too: each of next enters once at most */
     if (!es_grow(world->context, (void**)&rigid->events, &rigid->event_capacity, rigid->event_count, events, sizeof *rigid->events)) return false;
     es_collide_contacts(world);
     es_report_contacts(world);
@@ -202,6 +202,7 @@ es_result es_rigid_step(es_world* world, float h, uint32_t substeps)
     bool good = touch(world) && es_solve(world, h, substeps);
     swap_kinematic(world);
     if (!good) return es_context_last_result(world->context);
+    es_report_pressed(world);
     es_stop_fast_bodies(world);
     refresh_boxes(world, h);
     return es_islands_sleep(world, h) ? ES_OK : es_context_last_result(world->context);
