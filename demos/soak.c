@@ -1,18 +1,19 @@
 /* `earthshine soak`: hours of the built-in scenes without a picture, and whether everything in them stays where and what it should be. */
 #include "demo.h"
+#include "energy_watch.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { PARTS = 4 };
+enum { LOOK = 8 /* steps between looks at every body */ };
 
 typedef struct soak {
     const char* scene;
     double seconds;
     uint32_t threads;
     bool no_sleep;
-    double peak[PARTS];   /* J: most kinetic energy of bodies and cloth, by parts of the time */
+    double peak;          /* J: most kinetic energy of bodies and cloth together, after the first half */
     uint32_t bodies, softs;
     float low[3], high[3]; /* of what there was to see when it began */
     char trouble[256];
@@ -48,8 +49,7 @@ static double look_at_bodies(soak* s, const es_world* world, uint32_t* ids, doub
         const char* name = es_world_name(world, ES_OBJECT_BODY, ids[i]);
         if (!all_finite(state.centre, state.velocity, state.angular_velocity)) trouble(s, time, "is no number", name ? name : "", ids[i]);
         else if (is_lost(s, state.centre)) trouble(s, time, "is lost", name ? name : "", ids[i]);
-        const es_vec3 v = state.velocity;
-        energy += 0.5 * (double)state.mass * ((double)v.x * v.x + (double)v.y * v.y + (double)v.z * v.z);
+        energy += (double)state.kinetic_energy;
     }
     return energy;
 }
@@ -84,11 +84,24 @@ static void look_at_instances(soak* s, const es_world* world, double time)
         if ((!isfinite(low[k]) || !isfinite(high[k])) && !s->trouble[0]) snprintf(s->trouble, sizeof s->trouble, "after %.1f s: what is drawn has no bounds", time);
 }
 
-/* The last part of the time must not have more in it than those before: what swings, or is driven in circles, has the same again and again. */
-static bool has_grown(const soak* s)
+/* What energy_watch.h says of it. */
+static void look_at_gain(soak* s, const es_world* world, const energy_watch* watch)
 {
-    double before = fmax(s->peak[0], s->peak[1]), after = fmax(s->peak[2], s->peak[3]);
-    return after > 1.1 * before + 1e-3;
+    const energy_gain gain = energy_watch_worst(watch);
+    if (!gain.id || gain.joules <= gain.allowed || s->trouble[0]) return;
+    const char* name = es_world_name(world, gain.kind, gain.id);
+    snprintf(s->trouble, sizeof s->trouble, "after %.1f s: %s %u%s%.64s has gained %.3g J that nothing gave it, of %.3g J allowed", gain.time, gain.kind == ES_OBJECT_SOFT ? "soft body" : "body",
+        gain.id, name && name[0] ? ", " : "", name ? name : "", gain.joules, gain.allowed);
+}
+
+static void report(const soak* s, const energy_gain* gain, double rate)
+{
+    const double judged = (double)gain->judged / (double)(gain->judged + gain->driven ? gain->judged + gain->driven : 1);
+    printf("%-14s %5u bodies %3u soft bodies, %g s, %.0f steps per second, kinetic energy at most %.4g J in the second half, ", s->scene, s->bodies, s->softs, s->seconds, rate, s->peak);
+    if (gain->judged) printf("gained by nothing at most %.3g J (%.1f %% of what is allowed; judged %.1f %% of all)", gain->joules, 100 * gain->joules / gain->allowed, 100 * judged);
+    else printf("everything driven or nothing there");
+    printf(": %s\n", s->trouble[0] ? s->trouble : "good");
+    fflush(stdout);
 }
 
 static uint32_t* count_objects(soak* s, const es_world* world)
@@ -113,7 +126,8 @@ static int run(soak* s)
     if (code == DEMO_OK && (es_world_open(session.context, s->scene, &settings, &session.world) != ES_OK || es_world_step(session.world, 0) != ES_OK))
         code = demo_refuse_context(session.context);
     uint32_t* ids = code == DEMO_OK ? count_objects(s, session.world) : NULL;
-    if (code == DEMO_OK && !ids) code = demo_refuse("out of memory");
+    energy_watch* watch = code == DEMO_OK ? energy_watch_open(session.world) : NULL;
+    if (code == DEMO_OK && (!ids || !watch)) code = demo_refuse("out of memory");
     es_vec3 low = {0}, high = {0};
     if (code == DEMO_OK) es_world_bounds(session.world, &low, &high);
     memcpy(s->low, &low, sizeof s->low);
@@ -122,21 +136,18 @@ static int run(soak* s)
     const uint64_t steps = (uint64_t)(s->seconds * rate);
     for (uint64_t i = 0; i < steps && code == DEMO_OK && !s->trouble[0]; i++) {
         if (es_world_step(session.world, settings.step) != ES_OK) code = demo_refuse_context(session.context);
-        if (code != DEMO_OK || (i % 8 && i + 1 < steps)) continue;
+        else if (!energy_watch_step(watch, session.world)) code = demo_refuse("out of memory");
+        if (code != DEMO_OK || (i % LOOK && i + 1 < steps)) continue;
         const double time = (double)(i + 1) / rate;
         const double energy = look_at_bodies(s, session.world, ids, time) + look_at_softs(s, session.world, ids, time);
-        double* peak = &s->peak[i * PARTS / steps];
-        if (energy > *peak) *peak = energy;
+        if (i >= steps / 2) s->peak = fmax(s->peak, energy);
         look_at_instances(s, session.world, time);
+        look_at_gain(s, session.world, watch);
     }
     free(ids);
-    const double took = demo_seconds() - begin;
-    if (code == DEMO_OK && !s->trouble[0] && has_grown(s)) snprintf(s->trouble, sizeof s->trouble, "energy grows");
-    if (code == DEMO_OK) {
-        printf("%-14s %5u bodies %3u soft bodies, %g s, %.0f steps per second, kinetic energy at most %.4g %.4g %.4g %.4g J: %s\n", s->scene, s->bodies, s->softs, s->seconds,
-            (double)steps / took, s->peak[0], s->peak[1], s->peak[2], s->peak[3], s->trouble[0] ? s->trouble : "good");
-        fflush(stdout);
-    }
+    const energy_gain gain = watch ? energy_watch_worst(watch) : (energy_gain){0};
+    energy_watch_close(watch);
+    if (code == DEMO_OK) report(s, &gain, (double)steps / (demo_seconds() - begin));
     demo_session_close(&session);
     return code == DEMO_OK && s->trouble[0] ? DEMO_EXCEEDED : code;
 }

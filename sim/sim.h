@@ -415,6 +415,7 @@ typedef struct es_body_state {
     es_vec3 local_centre;     /* the same in the body's axes */
     es_vec3 velocity, angular_velocity; /* of the centre of mass */
     float mass;               /* 0: static and kinematic */
+    float kinetic_energy;     /* J, of motion and turning; 0: static and kinematic */
     float linear_damping, angular_damping, gravity_scale;
     uint32_t shape_count;
     bool no_sleep, asleep, continuous;

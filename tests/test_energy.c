@@ -1,0 +1,244 @@
+/* Bodies gain no energy that nothing gave them, by the measure of `earthshine soak`; and that measure sees it when they do, and is not
+ * misled by what drives them. */
+#include "demos/energy_watch.h"
+#include "tests/rigid_tools.h"
+
+/* Steps and watches; `each` may act on the world before a step. */
+static energy_gain watch(arena* a, energy_watch* w, int steps, void (*each)(arena* a, int step, void* user), void* user)
+{
+    for (int i = 0; i < steps; i++) {
+        if (each) each(a, i, user);
+        step(a, 1);
+        assert_true(energy_watch_step(w, a->world));
+    }
+    return energy_watch_worst(w);
+}
+
+static energy_gain watch_all(arena* a, int steps, void (*each)(arena* a, int step, void* user), void* user)
+{
+    energy_watch* w = energy_watch_open(a->world);
+    assert_non_null(w);
+    energy_gain gain = watch(a, w, steps, each, user);
+    energy_watch_close(w);
+    return gain;
+}
+
+static void kick(arena* a, int i, void* user)
+{
+    const es_body_state s = state_of(a, *(es_body*)user);
+    if (i % 90 == 89) assert_int_equal(es_world_apply_impulse(a->world, *(es_body*)user, (es_vec3){0, s.mass * 1.5f, 0}, NULL), ES_OK);
+}
+
+static void push(arena* a, int i, void* user)
+{
+    const es_body_state s = state_of(a, *(es_body*)user);
+    assert_int_equal(es_world_apply_force(a->world, *(es_body*)user, (es_vec3){s.mass * 0.02f, 0, 0}, NULL), ES_OK);
+}
+
+/* A heap that falls, collides, comes to rest and trembles there, awake. */
+static void falling_and_resting(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    add_floor(&a);
+    es_body top = {0};
+    for (int i = 0; i < 12; i++) top = add_box(&a, 0.25f, 0.2 * (i % 3), 0.4 + 0.6 * i, 0.15 * (i % 2));
+    energy_watch* w = energy_watch_open(a.world);
+    assert_non_null(w);
+    energy_gain gain = watch(&a, w, 600, NULL, NULL);
+    assert_true(gain.judged == 12 * 20 && gain.driven == 0);
+    assert_true(gain.joules < gain.allowed);
+    /* the same, but it gets something from nowhere */
+    gain = watch(&a, w, 600, kick, &top);
+    assert_true(gain.joules > gain.allowed);
+    energy_watch_close(w);
+    free_arena(&a);
+}
+
+/* Less in each window than trembling is allowed, and yet always more. */
+static void creeping(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    es_body body = add_box(&a, 0.25f, 0, 0, 0);
+    energy_gain gain = watch_all(&a, 300, push, &body);
+    assert_true(gain.joules < gain.allowed); /* 0.1 m/s: not yet */
+    gain = watch_all(&a, 1500, push, &body);
+    assert_true(gain.joules > gain.allowed);
+    assert_true(gain.id == body.id && gain.kind == ES_OBJECT_BODY);
+    free_arena(&a);
+}
+
+/* Boxes and balls that lose nothing when they bounce, off walls and each other, fast and spinning. */
+static void bouncing(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    for (int k = 0; k < 6; k++) {
+        es_shape_desc wall = box_shape(k / 2 == 0 ? 0.5f : 2, k / 2 == 1 ? 0.5f : 2, k / 2 == 2 ? 0.5f : 2);
+        wall.restitution = 1;
+        wall.friction = 0;
+        const double at = k % 2 ? 1.5 : -1.5;
+        add_body(&a, ES_BODY_STATIC, &wall, k / 2 == 0 ? at : 0, k / 2 == 1 ? at : 0, k / 2 == 2 ? at : 0, no_turn);
+    }
+    double before = 0, after = 0;
+    es_body bodies[8];
+    for (int i = 0; i < 8; i++) {
+        es_shape_desc shape = i % 2 ? box_shape(0.12f, 0.12f, 0.12f) : ball_shape(0.13f);
+        shape.restitution = 1;
+        shape.friction = 0;
+        es_body_desc desc = es_default_body_desc();
+        desc.shapes = &shape;
+        desc.shape_count = 1;
+        desc.continuous = true;
+        desc.position[0] = i % 2 - 0.5;
+        desc.position[1] = i / 2 % 2 - 0.5;
+        desc.position[2] = i / 4 - 0.5;
+        desc.velocity = (es_vec3){4 - (float)i, 3.0f - (float)(i * i % 7), 2.0f + (float)(i % 3)};
+        desc.angular_velocity = (es_vec3){(float)i, 3, 5 - (float)i};
+        assert_int_equal(es_world_add_body(a.world, &desc, &bodies[i]), ES_OK);
+        before += (double)state_of(&a, bodies[i]).kinetic_energy;
+    }
+    const energy_gain gain = watch_all(&a, 600, NULL, NULL);
+    assert_int_equal(gain.judged, 8 * 20);
+    assert_true(gain.joules < gain.allowed);
+    for (int i = 0; i < 8; i++) after += (double)state_of(&a, bodies[i]).kinetic_energy;
+    assert_true(after < 1.01 * before && after > 0.5 * before);
+    free_arena(&a);
+}
+
+/* ---- driven ------------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct pusher { es_node node; es_body box; } pusher;
+
+/* One metre along x and back in two seconds, for six; then it stands still. */
+static void move_pusher(arena* a, int i, void* user)
+{
+    const pusher* p = user;
+    const int t = i < 360 ? i % 120 : 0;
+    es_transform transform = {{-1.2f + (t < 60 ? (float)t / 60 : (float)(120 - t) / 60), 0.25f, 0}, {0, 0, 0, 1}, {1, 1, 1}};
+    assert_int_equal(es_world_set_node_transform(a->world, p->node, &transform), ES_OK);
+}
+
+static void kick_when_it_stands(arena* a, int i, void* user)
+{
+    pusher* p = user;
+    move_pusher(a, 360, user);
+    kick(a, i, &p->box);
+}
+
+static void pushed_by_what_moves(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    add_floor(&a);
+    pusher p;
+    es_node_desc node = {.transform = {{-1.2f, 0.25f, 0}, {0, 0, 0, 1}, {1, 1, 1}}};
+    assert_int_equal(es_world_add_node(a.world, &node, &p.node), ES_OK);
+    es_shape_desc shape = box_shape(0.25f, 0.25f, 0.25f);
+    es_body_desc desc = es_default_body_desc();
+    desc.type = ES_BODY_KINEMATIC;
+    desc.node = p.node;
+    desc.shapes = &shape;
+    desc.shape_count = 1;
+    es_body mover;
+    assert_int_equal(es_world_add_body(a.world, &desc, &mover), ES_OK);
+    p.box = add_box(&a, 0.25f, -0.6, 0.25, 0);
+    add_box(&a, 0.25f, -0.05, 0.25, 0.1); /* pushed by the box, not by the mover */
+    energy_watch* w = energy_watch_open(a.world);
+    assert_non_null(w);
+    energy_gain gain = watch(&a, w, 480, move_pusher, &p);
+    assert_true(gain.driven >= 2 && gain.judged >= 8 && gain.driven + gain.judged == 2 * 16);
+    assert_true(gain.joules < gain.allowed);
+    gain = watch(&a, w, 300, kick_when_it_stands, &p);
+    assert_true(gain.joules > gain.allowed);
+    energy_watch_close(w);
+    free_arena(&a);
+}
+
+static void driven_by_joints_and_hands(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    es_body wheel = add_box(&a, 0.25f, 0, 0, 0), held = add_box(&a, 0.25f, 5, 0, 0), hanging = add_box(&a, 0.25f, 5, -1, 0);
+    es_joint_desc motor = es_default_joint_desc(), rod = es_default_joint_desc();
+    motor.type = ES_JOINT_HINGE;
+    motor.b = wheel;
+    motor.motor = true;
+    motor.speed = 5;
+    motor.max_torque = 100;
+    rod.type = ES_JOINT_DISTANCE;
+    rod.a = held;
+    rod.b = hanging;
+    es_joint joint;
+    assert_int_equal(es_world_add_joint(a.world, &motor, &joint), ES_OK);
+    assert_int_equal(es_world_add_joint(a.world, &rod, &joint), ES_OK);
+    assert_int_equal(es_world_grab_body(a.world, 0, held, (es_vec3){0, 0, 0}, (const double[3]){5, 2, 1}, 0), ES_OK);
+    energy_gain gain = watch_all(&a, 120, NULL, NULL);
+    assert_true(gain.judged == 0 && gain.driven == 3 * 4);
+    /* let go, what the hand gave stays */
+    assert_int_equal(es_world_release(a.world, 0), ES_OK);
+    gain = watch_all(&a, 120, NULL, NULL);
+    assert_true(gain.judged == 2 * 4 && gain.driven == 4);
+    assert_true(gain.joules < gain.allowed);
+    free_arena(&a);
+}
+
+/* ---- cloth ------------------------------------------------------------------------------------------------------------------------- */
+
+static es_soft add_cloth(arena* a, float height)
+{
+    enum { SIDE = 12 };
+    float p[3 * SIDE * SIDE];
+    uint32_t indices[6 * (SIDE - 1) * (SIDE - 1)], count = 0;
+    for (uint32_t j = 0; j < SIDE; j++)
+        for (uint32_t i = 0; i < SIDE; i++) {
+            const float place[3] = {(float)i / (SIDE - 1) - 0.5f, height, (float)j / (SIDE - 1) - 0.5f};
+            memcpy(p + 3 * (j * SIDE + i), place, sizeof place);
+            if (i + 1 == SIDE || j + 1 == SIDE) continue;
+            const uint32_t c = j * SIDE + i, corners[6] = {c, c + SIDE, c + SIDE + 1, c, c + SIDE + 1, c + 1};
+            memcpy(indices + count, corners, sizeof corners);
+            count += 6;
+        }
+    es_soft_desc desc = es_default_soft_desc();
+    assert_int_equal(es_world_add_mesh(a->world, &(es_mesh_desc){.name = "sheet", .vertex_count = SIDE * SIDE, .triangle_count = count / 3, .positions = p, .indices = indices}, &desc.mesh), ES_OK);
+    es_soft soft;
+    assert_int_equal(es_world_add_soft(a->world, &desc, &soft), ES_OK);
+    return soft;
+}
+
+static void blow_up(arena* a, int i, void* user)
+{
+    if (i % 60 == 59) assert_int_equal(es_world_soft_impulse(a->world, *(es_soft*)user, ES_SOFT_ALL, (es_vec3){0, 1.5f, 0}), ES_OK);
+}
+
+static void cloth_over_a_box(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    add_floor(&a);
+    es_shape_desc light = box_shape(0.25f, 0.25f, 0.25f);
+    light.density = 8; /* 1 kg, as the cloth */
+    add_body(&a, ES_BODY_DYNAMIC, &light, 0, 0.25, 0, no_turn);
+    es_soft cloth = add_cloth(&a, 0.9f);
+    energy_gain gain = watch_all(&a, 300, NULL, NULL);
+    assert_true(gain.judged == 2 * 10 && gain.driven == 0);
+    assert_true(gain.joules < gain.allowed);
+    gain = watch_all(&a, 300, blow_up, &cloth);
+    assert_true(gain.joules > gain.allowed);
+    /* held, it can be swung, and the box it hangs about with it */
+    assert_int_equal(es_world_soft_attach(a.world, cloth, &(es_soft_attachment){.vertex = 0, .in_place = true}), ES_OK);
+    gain = watch_all(&a, 60, blow_up, &cloth);
+    assert_true(gain.judged == 0 && gain.driven == 2 * 2);
+    free_arena(&a);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(falling_and_resting),
+        cmocka_unit_test(creeping),
+        cmocka_unit_test(bouncing),
+        cmocka_unit_test(pushed_by_what_moves),
+        cmocka_unit_test(driven_by_joints_and_hands),
+        cmocka_unit_test(cloth_over_a_box),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
