@@ -20,14 +20,18 @@ float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inp
 
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer)
 {
-    size_t floats = (size_t)gbuffer->stride * gbuffer->height, bytes = 3 * floats * sizeof(float) + (size_t)es_lit_chunks(gbuffer->stride) * gbuffer->height;
+    /* Planes a multiple of 4096 bytes apart would fall into the same cache sets, and passes go through up to fifteen side by side. */
+    size_t floats = ((size_t)gbuffer->stride * gbuffer->height + 15) / 16 * 16;
+    const size_t lit_bytes = (size_t)es_lit_chunks(gbuffer->stride) * gbuffer->height, shift = (size_t)((uintptr_t)planes / sizeof *planes % 8) * 512;
+    if (floats % 1024 < 64 || floats % 1024 > 1024 - 64) floats += 5 * 16 + 64;
+    size_t bytes = 3 * floats * sizeof(float) + lit_bytes + 4096;
     if (planes->bytes == bytes) return ES_OK;
     es_planes_free(context, planes);
     planes->memory = es_allocate_zero(context, bytes); /* passes write pixels, vectors read the padding of rows as well */
     if (!planes->memory) return es_context_last_result(context);
     planes->bytes = bytes;
-    for (int k = 0; k < 3; k++) planes->at[k] = (float*)planes->memory + (size_t)k * floats;
-    planes->lit = (uint8_t*)planes->memory + 3 * floats * sizeof(float);
+    for (int k = 0; k < 3; k++) planes->at[k] = (float*)((char*)planes->memory + shift) + (size_t)k * floats;
+    planes->lit = (uint8_t*)planes->memory + shift + 3 * floats * sizeof(float);
     return ES_OK;
 }
 

@@ -14,7 +14,7 @@
  * I in eq. 3.3 is what a white surface would show at the frame's exposure: exposure (irradiance / pi + what the lobe reflects), over R, G, B.
  * With `clamp` I_prev is then brought into the range of I_new over 3 × 3 pixels, widened by that share.
  *
- * Reset: where the light itself changed, history would glow on (§5.4). Every fourth pixel of every fourth row is a sample of last frame's
+ * Reset: where the light itself changed, history would glow on (§5.4). The pixels of every eighth row are samples of last frame's
  * picture that this frame's lights have lit anew; over a tile of ES_TEMPORAL_TILE² pixels the sums of both are compared, as the gradients of
  * adaptive temporal filtering are (Schied, Peters and Dachsbacher 2018), here with the blended history, so that slow drift is noticed
  * too. reset rises from 0 to 1 as the difference goes from reset_low to reset_high of the larger sum; the largest of a tile's and
@@ -28,7 +28,7 @@
 #include "gi/gi.h"
 #include "platform/context.h"
 
-enum { ES_TEMPORAL_TILE = 32, ES_TEMPORAL_SAMPLE = 4 };
+enum { ES_TEMPORAL_TILE = 32, ES_TEMPORAL_SAMPLE = 8 };
 
 typedef struct es_temporal_job {
     const es_gbuffer* gbuffer;        /* depth and normal; motion where `moving` */

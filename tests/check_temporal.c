@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "gi/kernel_table.h"
+#include "gi/lit.h"
 #include "gi/temporal.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -147,6 +148,66 @@ static void check_blend(void** state)
         }
         tear_down(&s);
     }
+}
+
+/* Where lobes are known to be dark, their planes are left alone: results are those of reading them, what is not written is zero there, and a
+ * first frame, which has nothing to blend with, knows no more to be lit than its source. */
+static void check_lit(void** state)
+{
+    (void)state;
+    uint64_t dark = 0;
+    for (uint32_t trial = 0; trial < 60; trial++) {
+        setup s;
+        set_up(&s, trial);
+        s.job.plane_count = 6;
+        s.job.history_count = trial % 5 ? 6 : 0;
+        const uint32_t chunks = es_lit_chunks(s.now.stride), height = s.now.height;
+        const size_t count = (size_t)s.now.stride * height, bytes = (size_t)chunks * height;
+        uint8_t *lit = malloc(3 * bytes), *lit_then = lit + bytes, *lit_result = lit + 2 * bytes;
+        for (size_t i = 0; i < bytes; i++) {
+            lit[i] = random_bits() % 8 == 0;
+            lit_then[i] = random_bits() % 64 == 0;
+            lit_result[i] = random_bits() % 2;
+        }
+        plane expected[6], result[6];
+        for (int k = 0; k < 6; k++) {
+            expected[k] = new_plane(count);
+            result[k] = new_plane(count);
+            for (size_t i = 0; i < count; i++) {
+                const size_t chunk = i / s.now.stride * chunks + i % s.now.stride / ES_LIT_COLUMNS;
+                if (k >= 3 && !lit[chunk]) at(s.source[k])[i] = 0.0f;
+                if (k >= 3 && !lit_then[chunk]) at(s.history[k])[i] = 0.0f;
+                at(result[k])[i] = k >= 3 && !lit_result[chunk] ? 0.0f : 1.0f;
+            }
+            s.job.result[k] = at(expected[k]);
+        }
+        es_gi_kernel_table(ES_ISA_SCALAR)->temporal_blend(&s.job, 0, height);
+        for (int k = 0; k < 6; k++) s.job.result[k] = at(result[k]);
+        s.job.source_lit = lit;
+        s.job.history_lit = lit_then;
+        s.job.result_lit = lit_result;
+        es_gi_kernel_table(ES_ISA_SCALAR)->temporal_blend(&s.job, 0, height);
+        for (uint32_t k = 0; k < 6; k++) {
+            check_guards(result[k]);
+            for (uint32_t y = 0; y < height; y++) {
+                for (uint32_t x = 0; x < s.now.width; x++) {
+                    const size_t i = (size_t)y * s.now.stride + x;
+                    const bool known_dark = k >= 3 && !(lit_result[(size_t)y * chunks + x / ES_LIT_COLUMNS] & 1);
+                    dark += known_dark;
+                    if (at(expected[k])[i] != at(result[k])[i]) fail_msg("trial %u plane %u at (%u, %u): %.9g, with lit chunks %.9g", trial, k, x, y, (double)at(expected[k])[i], (double)at(result[k])[i]);
+                    if (known_dark) assert_true(at(result[k])[i] == 0.0f);
+                }
+            }
+        }
+        if (!s.job.history_count) assert_memory_equal(lit, lit_result, bytes);
+        for (int k = 0; k < 6; k++) {
+            free(expected[k].memory);
+            free(result[k].memory);
+        }
+        free(lit);
+        tear_down(&s);
+    }
+    assert_true(dark > 10000);
 }
 
 static void check_compare(void** state)
@@ -323,6 +384,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(check_blend),
+        cmocka_unit_test(check_lit),
         cmocka_unit_test(check_compare),
         cmocka_unit_test(check_equations),
         cmocka_unit_test(check_reset),
