@@ -269,7 +269,7 @@ static uint64_t scene_hash(const es_frame_inputs* in)
     return es_hash_bytes(hash, in->lights, in->light_count * sizeof *in->lights);
 }
 
-static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, uint32_t picture)
+static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_world* world, uint32_t picture)
 {
     es_plan* plan = &r->plan;
     if (in->no_indirect) {
@@ -307,7 +307,8 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, uint32_t p
     }
     for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i], receivers);
     if (!result && stable) {
-        es_stable_vpl_request of_stable = {request, r->settings.renew, in->list, scene_hash(in), in->revisions.materials};
+        es_stable_vpl_request of_stable = {.sample = request, .renew = r->settings.renew, .list = in->list, .extent = in->extent, .scene = scene_hash(in), .materials = in->revisions.materials};
+        es_world_origin(world, of_stable.origin);
         result = es_stable_vpls_update(r->context, &r->stable, r->light_views, r->light_count, r->importances, &of_stable, r->vpls, &r->first_vpls);
     } else if (!result) es_stable_vpls_free(r->context, &r->stable);
     if (!result && !stable) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->first_vpls);
@@ -462,7 +463,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     r->rays = es_pixel_rays_of_view(&r->view);
     es_result result = pass_visibility(r, in);
     if (!result) result = pass_light_views(r, in);
-    if (!result) result = pass_vpls(r, in, picture);
+    if (!result) result = pass_vpls(r, in, world, picture);
     if (!result) result = pass_maps(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
     if (!result) result = es_pass_bounces(r, in);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/light_change.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -20,6 +21,7 @@ typedef struct light_work {
     uint32_t wanted, owned, seen;  /* places; seen: those that send something */
     es_stable_light* kept;
     bool renewed;                  /* has lost so many that all missing ones come at once */
+    bool jumped;                   /* since the last update */
 } light_work;
 
 /* A place as the light sees it now. */
@@ -346,6 +348,9 @@ static es_result prepare_lights(work* w, const es_light_view* views, uint32_t vi
     }
     stable->light_count = kept;
     w->light_count = view_count;
+    const double *from = stable->origin, *to = w->request->origin;
+    const es_vec3 shift = es_v3((float)(from[0] - to[0]), (float)(from[1] - to[1]), (float)(from[2] - to[2]));
+    memcpy(stable->origin, to, sizeof stable->origin);
     for (uint32_t l = 0; l < view_count; l++) {
         light_work* light = &w->lights[l];
         *light = (light_work){.view = &views[l], .importance = &importances[l], .total = es_importance_total(&importances[l]), .wanted = shares[l], .side = 1};
@@ -358,8 +363,11 @@ static es_result prepare_lights(work* w, const es_light_view* views, uint32_t vi
         if (light->total > 0.0f) set_target(light);
         uint32_t k = 0;
         while (k < stable->light_count && stable->lights[k].light != views[l].light.handle.id) k++;
-        if (k == stable->light_count) stable->lights[stable->light_count++] = (es_stable_light){views[l].light.handle.id, 0};
+        if (k == stable->light_count) stable->lights[stable->light_count++] = (es_stable_light){views[l].light.handle.id, 0, views[l].light};
         light->kept = &stable->lights[k];
+        light->jumped = light->kept->then.type != views[l].light.type || es_light_movement(&light->kept->then, &views[l].light, shift, w->request->extent) >= ES_LIGHT_JUMP;
+        light->kept->then = views[l].light;
+        if (light->jumped) light->kept->drawn = 0; /* as a new one */
     }
     return ES_OK;
 }
@@ -400,11 +408,11 @@ static uint32_t send_away(work* w, const light_work* light, uint32_t count, floa
 static void renew(work* w, uint32_t planned, uint32_t budget, bool scene_changed, bool* changed)
 {
     es_stable_vpls* stable = w->stable;
-    /* who is there; a place whose light is gone, or that its light does not see, is free */
+    /* who is there; a place whose light is gone, has jumped, or does not see it, is free */
     for (uint32_t l = 0; l < w->light_count; l++) w->lights[l].owned = w->lights[l].seen = 0;
     for (uint32_t v = 0; v < stable->count; v++) {
         light_work* light = light_of(w, stable->places[v].light);
-        if (!light || !light->wanted) {
+        if (!light || !light->wanted || light->jumped) {
             if (stable->places[v].light) *changed = true;
             stable->places[v] = (es_stable_vpl){0};
             continue;

@@ -16,7 +16,8 @@
  * Moved elsewhere are, no more than `renew` of all in a frame: lights that send nothing any more; those of a light that has too many; and, in
  * frames in which anything changed, those that stand where there are over twice too many. Newcomers take of a few candidates of the
  * light's own Halton sequence the one where places are scarcest. When a light has lost half of its set, or is new, all of its missing
- * places are drawn at once. A place keeps its number, and with it its subset of pixels and of points. No camera has a say. */
+ * places are drawn at once; and all of them when it has jumped (gi/light_change.h): where its light fell before says nothing of where it
+ * falls now, and a set that came over by and by would leave its light behind for as long. A place keeps its number, and with it its subset of pixels and of points. No camera has a say. */
 #ifndef EARTHSHINE_GI_STABLE_VPLS_H
 #define EARTHSHINE_GI_STABLE_VPLS_H
 
@@ -35,7 +36,10 @@ typedef struct es_stable_vpl {
     uint64_t materials;        /* revision that the surface was seen at */
 } es_stable_vpl;
 
-typedef struct es_stable_light { uint32_t light, drawn; } es_stable_light;
+typedef struct es_stable_light {
+    uint32_t light, drawn;
+    es_light_state then;       /* at the last update */
+} es_stable_light;
 
 /* All that is kept; nothing else of the last frame is. */
 typedef struct es_stable_vpls {
@@ -44,6 +48,7 @@ typedef struct es_stable_vpls {
     es_stable_light* lights;   /* those that have been seen, and how far their sequences are used up */
     uint32_t light_count;
     size_t light_capacity;
+    double origin[3];          /* that the lights of the last update were relative to */
     uint64_t scene;            /* hash of what the last update saw */
     bool settled;              /* the next update with the same scene changes nothing */
     uint32_t moved;            /* by the last update */
@@ -53,6 +58,8 @@ typedef struct es_stable_vpl_request {
     es_vpl_request sample;
     float renew;
     const es_draw_list* list;
+    double origin[3];          /* that the views' lights are relative to */
+    float extent;              /* of the scene */
     uint64_t scene, materials; /* equal numbers: nothing the lights see has changed; no material has */
 } es_stable_vpl_request;
 

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "gi/indirect.h"
+#include "gi/light_change.h"
 #include "gi/renderer.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -41,7 +42,7 @@ static bool same_view(const es_raster_view* a, const es_mat4* view, const es_mat
     return memcmp(&a->view, view, sizeof *view) == 0 && memcmp(&a->projection, projection, sizeof *projection) == 0;
 }
 
-/* How suddenly lights changed: 1 where one came or went, doubled its light, or moved by a tenth of the scene's extent or 25 degrees. */
+/* How suddenly lights changed (gi/light_change.h); 1 where one came or went, and at most. */
 static float light_change(const es_history* h, const es_frame_inputs* in, const double origin[3])
 {
     if (h->light_count != in->light_count) return 1.0f;
@@ -50,15 +51,7 @@ static float light_change(const es_history* h, const es_frame_inputs* in, const 
     for (uint32_t i = 0; i < in->light_count; i++) {
         const es_light_state *a = &h->lights[i], *b = &in->lights[i];
         if (a->handle.id != b->handle.id || a->type != b->type) return 1.0f;
-        float difference = 0.0f, larger = 1e-30f;
-        for (int k = 0; k < 3; k++) {
-            difference += es_absf(a->radiant[k] - b->radiant[k]);
-            larger += es_maxf(a->radiant[k], b->radiant[k]);
-        }
-        const float moved = a->type == ES_LIGHT_DIRECTIONAL ? 0.0f : es_v3_length(es_v3_sub(es_v3_add(a->position, shift), b->position)) / in->extent;
-        const float turned = a->type == ES_LIGHT_POINT ? 0.0f : 1.0f - es_v3_dot(a->direction, b->direction);
-        const float opened = a->type == ES_LIGHT_SPOT ? es_maxf(es_absf(a->cos_inner - b->cos_inner), es_absf(a->cos_outer - b->cos_outer)) : 0.0f;
-        most = es_maxf(most, es_maxf(es_maxf(2.0f * difference / larger, 10.0f * moved), 10.0f * es_maxf(turned, opened)));
+        most = es_maxf(most, es_light_change(a, b, shift, in->extent));
     }
     return es_minf(most, 1.0f);
 }

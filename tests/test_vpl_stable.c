@@ -278,6 +278,44 @@ static void test_lights_come_and_go(void** state)
     small_world_destroy(&s.w);
 }
 
+/* A lamp that jumps is a new one: its lights are those that a renderer which never saw it elsewhere draws, in that very frame, and stay. One that
+ * moves by less keeps most of them. */
+static void test_a_lamp_jumps(void** state)
+{
+    (void)state;
+    stage s = open_stage(1, 2);
+    es_renderer_settings settings = settings_of(true);
+    es_renderer* renderer = renderer_of(&s, &settings);
+    for (int frame = 0; frame < 4; frame++) {
+        move_all(&s, frame);
+        assert_int_equal(es_renderer_render(renderer, s.w.world), ES_OK);
+    }
+    static const struct { float x; bool jumps; } places[] = {{0.35f, false}, {-0.9f, true}};
+    for (size_t i = 0; i < 2; i++) {
+        es_vpl before[VPLS], after[VPLS], rest[VPLS], anew[VPLS];
+        lights_of(renderer, before);
+        set_position(&s, s.lamp[0], es_v3(places[i].x, 2.4f, 1.5f));
+        step_stage(&s);
+        assert_int_equal(es_renderer_render(renderer, s.w.world), ES_OK);
+        lights_of(renderer, after);
+        es_renderer* other = renderer_of(&s, &settings);
+        assert_int_equal(es_renderer_render(other, s.w.world), ES_OK);
+        lights_of(other, anew);
+        es_renderer_destroy(other);
+        assert_int_equal(memcmp(after, anew, sizeof after) == 0, places[i].jumps);
+        int kept = 0;
+        for (int v = 0; v < VPLS; v++) kept += far(before[v].position, after[v].position) == 0.0;
+        assert_true(places[i].jumps ? kept < VPLS / 4 : kept > VPLS / 2);
+        if (!places[i].jumps) continue;
+        assert_int_equal(es_world_step(s.w.world, 0), ES_OK);
+        assert_int_equal(es_renderer_render(renderer, s.w.world), ES_OK);
+        lights_of(renderer, rest);
+        assert_memory_equal(after, rest, sizeof after);
+    }
+    es_renderer_destroy(renderer);
+    small_world_destroy(&s.w);
+}
+
 /* Each frame has the same bits with and without skipping and for any number of threads; a scene that stands still comes to rest. */
 static void test_same_bits_and_rest(void** state)
 {
@@ -314,6 +352,7 @@ int main(void)
         cmocka_unit_test(test_energy_is_that_of_new_sets),
         cmocka_unit_test(test_no_camera_moves_lights),
         cmocka_unit_test(test_lights_come_and_go),
+        cmocka_unit_test(test_a_lamp_jumps),
         cmocka_unit_test(test_same_bits_and_rest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
