@@ -132,18 +132,14 @@ static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* resu
     es_result outcome = es_planes_resize(r->context, result, &r->gbuffer);
     if (outcome || !bounces || !r->plan.valid[ES_PASS_SHADING]) return outcome;
     es_compose_job job = es_renderer_compose_job(r);
-    es_indirect_planes shaded, whole, filtered[2];
+    es_indirect_planes shaded, whole, filtered;
     memset(&shaded, 0, sizeof shaded);
     memset(&whole, 0, sizeof whole);
-    memset(filtered, 0, sizeof filtered);
+    memset(&filtered, 0, sizeof filtered);
     if (bounces < r->stats.bounce_count || r->plan.valid[ES_PASS_TEMPORAL]) {
-        es_planes irradiance[2], specular[2];
-        memset(irradiance, 0, sizeof irradiance);
-        memset(specular, 0, sizeof specular);
         outcome = es_indirect_shade(r, es_bounce_end(r, bounces), &shaded.irradiance, &shaded.specular);
-        if (!outcome) outcome = es_indirect_filter(r, &shaded.irradiance, &shaded.specular, irradiance, specular);
-        for (int i = 0; i < 2; i++) filtered[i] = (es_indirect_planes){irradiance[i], specular[i]};
-        const es_indirect_planes* last = r->filter_passes ? &filtered[(r->filter_passes - 1) % 2] : &shaded;
+        if (!outcome && r->filter_passes) outcome = es_indirect_filter(r, &shaded.irradiance, &shaded.specular, &filtered.irradiance, &filtered.specular);
+        const es_indirect_planes* last = r->filter_passes ? &filtered : &shaded;
         if (!outcome && r->plan.valid[ES_PASS_UPSAMPLE]) {
             outcome = es_indirect_upsample(r, &last->irradiance, &last->specular, &whole.irradiance, &whole.specular);
             last = &whole;
@@ -157,7 +153,7 @@ static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* resu
     if (!outcome) es_compose(r->context, &job);
     es_indirect_planes_free(r->context, &shaded);
     es_indirect_planes_free(r->context, &whole);
-    for (int i = 0; i < 2; i++) es_indirect_planes_free(r->context, &filtered[i]);
+    es_indirect_planes_free(r->context, &filtered);
     return outcome;
 }
 

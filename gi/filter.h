@@ -1,4 +1,4 @@
-/* Geometry-aware box filter over n × n pixels (Laine et al. 2007; Knecht 2009 §3.4.1).
+/* Geometry-aware box filter over n × n pixels (Laine et al. 2007; Knecht 2009 §3.4.1), once or several times.
  *
  * Gathers what interleaved shading spread over the n × n phases. A tap counts when it lies on what looks like the same surface:
  * |z' - z| <= depth_threshold · z and N'·N >= normal_threshold, z and N being the centre's; the centre always counts. Separable:
@@ -11,9 +11,12 @@
 #include "gi/gi.h"
 #include "platform/context.h"
 
+enum { ES_FILTER_MAX = 16, ES_FILTER_MAX_PASSES = 4 };
+
 typedef struct es_filter_job {
     const es_gbuffer* gbuffer;     /* depth and normal */
-    uint32_t size;                 /* n, 1 … 16 */
+    uint32_t size;                 /* n, 1 … ES_FILTER_MAX */
+    uint32_t passes;               /* one after another, 1 … ES_FILTER_MAX_PASSES */
     float depth_threshold, normal_threshold;
     uint32_t plane_count;          /* 1 … 6 */
     const float* source[6];        /* rows of gbuffer->stride */
@@ -27,20 +30,20 @@ es_result es_filter_geometry_aware(es_context* context, es_arena* arena, const e
 
 /* ---- between filter.c and its kernel ------------------------------------------------------------------------------------- */
 
-enum { ES_FILTER_COLUMNS = 128, ES_FILTER_ROWS = 48, ES_FILTER_MAX = 16,
-    ES_FILTER_MARGIN = ES_FILTER_MAX, /* a folded tap lies up to n - 1 columns away */
-    ES_FILTER_STRIDE = ES_FILTER_COLUMNS + 2 * ES_FILTER_MARGIN };
+enum { ES_FILTER_COLUMNS = 128, ES_FILTER_ROWS = 128,
+    ES_FILTER_GROUPS = (ES_FILTER_COLUMNS + 2 * ES_FILTER_MAX_PASSES * ES_FILTER_MAX) / 8, /* of eight columns, with margins of taps */
+    ES_FILTER_STRIDE = 8 * ES_FILTER_GROUPS + 16,  /* lines and planes begin at different places of a way of the cache */
+    ES_FILTER_LINES = ES_FILTER_MAX_PASSES * ES_FILTER_MAX };
 
-/* One block's input rows, with a margin of taps on both sides, and the rows filtered horizontally. */
+/* What passes keep of one block: each hands its lines to the next as soon as it has them, so that only the last windows stand, in rings. */
 typedef struct es_filter_scratch {
-    float in[6][ES_FILTER_STRIDE], depth_in[ES_FILTER_STRIDE], normal_in[3][ES_FILTER_STRIDE];
-    float depth[ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS];
-    float normal[3][ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS];
-    float mid[6][ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS];
-    /* per eight columns: does every pair of taps that a window of this line takes from it pass both tests; and how many lines, this one the
-     * last, have normals that pass with each other's */
-    bool even[ES_FILTER_STRIDE / 8];
-    uint8_t like[ES_FILTER_ROWS + ES_FILTER_MAX][ES_FILTER_COLUMNS / 8];
+    float in[ES_FILTER_MAX_PASSES][6][ES_FILTER_STRIDE];                /* a pass' latest line */
+    float mid[ES_FILTER_MAX_PASSES][ES_FILTER_MAX][6][ES_FILTER_STRIDE]; /* its lines, filtered along rows */
+    float depth[ES_FILTER_LINES][ES_FILTER_STRIDE], normal[ES_FILTER_LINES][3][ES_FILTER_STRIDE];
+    /* Of eight columns of a line: passes every pair of taps within a row's window both tests; in how many lines up to this one do neighbours
+     * above each other, and in how many do their normals. */
+    bool even[ES_FILTER_LINES][ES_FILTER_GROUPS];
+    uint8_t alike[ES_FILTER_LINES][ES_FILTER_GROUPS], alike_normals[ES_FILTER_LINES][ES_FILTER_GROUPS];
 } es_filter_scratch;
 
 #endif

@@ -117,30 +117,23 @@ static const es_planes* shaded_specular(const es_renderer* r) { return blended_f
 
 /* ---- filter ------------------------------------------------------------------------------------------------------------------ */
 
-es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes stages_irradiance[2], es_planes stages_specular[2])
+es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular)
 {
     const es_renderer_settings* s = &r->frame.settings;
     const es_gbuffer* shaded = es_indirect_gbuffer(r);
-    es_result result = ES_OK;
-    for (uint32_t i = 0; i < 2 && i < r->filter_passes && !result; i++) {
-        result = es_planes_resize(r->context, &stages_irradiance[i], shaded);
-        if (!result && r->has_specular) result = es_planes_resize(r->context, &stages_specular[i], shaded);
+    es_result result = es_planes_resize(r->context, filtered_irradiance, shaded);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, filtered_specular, shaded);
+    if (result) return result;
+    es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .passes = r->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3,
+        .source_lit = specular->lit, .result_lit = filtered_specular->lit};
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = irradiance->at[k];
+        job.result[k] = filtered_irradiance->at[k];
+        job.source[k + 3] = specular->at[k];
+        job.result[k + 3] = filtered_specular->at[k];
     }
-    for (uint32_t pass = 0; pass < r->filter_passes && !result; pass++) {
-        es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3,
-            .source_lit = specular->lit, .result_lit = stages_specular[pass % 2].lit};
-        for (int k = 0; k < 3; k++) {
-            job.source[k] = irradiance->at[k];
-            job.result[k] = stages_irradiance[pass % 2].at[k];
-            job.source[k + 3] = specular->at[k];
-            job.result[k + 3] = stages_specular[pass % 2].at[k];
-        }
-        irradiance = &stages_irradiance[pass % 2];
-        specular = &stages_specular[pass % 2];
-        es_arena_reset(&r->arena);
-        result = es_filter_geometry_aware(r->context, &r->arena, &job);
-    }
-    return result;
+    es_arena_reset(&r->arena);
+    return es_filter_geometry_aware(r->context, &r->arena, &job);
 }
 
 es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
@@ -160,14 +153,14 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
     float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
-    es_result result = es_indirect_filter(r, shaded_irradiance(r), shaded_specular(r), r->filtered_irradiance, r->filtered_specular);
+    es_result result = es_indirect_filter(r, shaded_irradiance(r), shaded_specular(r), &r->filtered_irradiance, &r->filtered_specular);
     const es_gbuffer* shaded = es_indirect_gbuffer(r);
     if (!result) es_plan_done(plan, ES_PASS_FILTER, (uint64_t)shaded->width * shaded->height * s->filter_passes);
     return result;
 }
 
-static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance[(r->filter_passes - 1) % 2] : shaded_irradiance(r); }
-static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular[(r->filter_passes - 1) % 2] : shaded_specular(r); }
+static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance : shaded_irradiance(r); }
+static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular : shaded_specular(r); }
 
 void es_indirect_unblended(const es_renderer* r, const es_planes** irradiance, const es_planes** specular)
 {

@@ -94,10 +94,8 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->specular);
     es_planes_free(context, &renderer->compensation);
     es_history_free(context, &renderer->history);
-    for (int i = 0; i < 2; i++) {
-        es_planes_free(context, &renderer->filtered_irradiance[i]);
-        es_planes_free(context, &renderer->filtered_specular[i]);
-    }
+    es_planes_free(context, &renderer->filtered_irradiance);
+    es_planes_free(context, &renderer->filtered_specular);
 }
 
 void es_renderer_destroy(es_renderer* renderer)

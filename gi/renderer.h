@@ -52,8 +52,8 @@ struct es_renderer {
     es_trace_scene trace_scene; /* of traced methods */
 
     es_planes direct;          /* reflected direct radiance */
-    es_planes irradiance, filtered_irradiance[2]; /* two to go back and forth between */
-    es_planes specular, filtered_specular[2];     /* used when something in the frame has a lobe */
+    es_planes irradiance, filtered_irradiance;
+    es_planes specular, filtered_specular;        /* used when something in the frame has a lobe */
     es_gbuffer half;           /* with half_resolution: what the indirect light is shaded and filtered on, and its planes */
     es_planes upsampled_irradiance, upsampled_specular;
     es_planes compensation;    /* of the lights' bias: reflected radiance, of either sign */

@@ -187,7 +187,7 @@ static void check_filter(void** state)
         uint32_t width = 1 + random_bits() % (trial % 3 ? 40 : 300), height = 1 + random_bits() % (trial % 4 ? 40 : 150);
         es_gbuffer g = new_gbuffer(width, height);
         const size_t count = (size_t)g.stride * height;
-        es_filter_job job = {.gbuffer = &g, .size = 1 + trial % 16, .depth_threshold = 0.05f, .normal_threshold = 0.8f, .plane_count = 1 + trial % 6};
+        es_filter_job job = {.gbuffer = &g, .size = 1 + trial % 16, .passes = 1 + trial % 7 % 4, .depth_threshold = 0.05f, .normal_threshold = 0.8f, .plane_count = 1 + trial % 6};
         float* source[6];
         plane expected[6], result[6];
         for (int k = 0; k < 6; k++) {
@@ -300,7 +300,7 @@ static void time_all(void)
     es_filter_scratch* scratch = malloc(sizeof *scratch);
     plane planes[6];
     es_shade_job job = {.gbuffer = &g, .rays = random_rays(false, 1024, 768), .vpl_count = COUNT, .maps = maps, .map_size = SIZE, .far_distance = 6, .bias = 0.05f, .geometry_bound = 20, .interleave = 8};
-    es_filter_job filter = {.gbuffer = &g, .size = 8, .depth_threshold = 0.05f, .normal_threshold = 0.8f, .plane_count = 3};
+    es_filter_job filter = {.gbuffer = &g, .size = 8, .passes = 2, .depth_threshold = 0.05f, .normal_threshold = 0.8f, .plane_count = 3};
     for (int k = 0; k < 6; k++) planes[k] = new_plane((size_t)g.stride * g.height);
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = at(planes[k]);

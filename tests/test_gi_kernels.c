@@ -379,7 +379,7 @@ static void test_interleaved_and_filtered_is_whole(void** state)
         es_vpl_record* lights = malloc(count * sizeof *lights);
         for (uint32_t v = 0; v < count; v++) lights[v] = light_at(es_v3(0, 0, 1e4f), es_v3(0, 0, -1), 1e8f, 2e8f, 3e8f); /* far away: even light */
         es_shade_job job = {.gbuffer = &gbuffer, .rays = rays, .vpls = lights, .vpl_count = count, .geometry_bound = 1, .interleave = n};
-        es_filter_job filter = {.gbuffer = &gbuffer, .size = n, .depth_threshold = 0.01f, .normal_threshold = 0.8f, .plane_count = 3};
+        es_filter_job filter = {.gbuffer = &gbuffer, .size = n, .passes = 1, .depth_threshold = 0.01f, .normal_threshold = 0.8f, .plane_count = 3};
         for (int k = 0; k < 3; k++) {
             job.irradiance[k] = planes[0][k];
             filter.source[k] = planes[0][k];
@@ -408,7 +408,7 @@ static void filter_planes(uint32_t n, uint32_t width, uint32_t height)
     es_gbuffer g = gbuffer;
     g.width = width;
     g.height = height;
-    es_filter_job job = {.gbuffer = &g, .size = n, .depth_threshold = 0.01f, .normal_threshold = 0.8f, .plane_count = 3};
+    es_filter_job job = {.gbuffer = &g, .size = n, .passes = 1, .depth_threshold = 0.01f, .normal_threshold = 0.8f, .plane_count = 3};
     for (int k = 0; k < 3; k++) {
         job.source[k] = planes[0][k];
         job.result[k] = planes[1][k];

@@ -1,9 +1,25 @@
-/* The geometry-aware box filter on one block of the image (gi/filter.h). */
+/* The geometry-aware box filter on one block of the image (gi/filter.h).
+ *
+ * All passes in one sweep over the block's lines: a line is filtered along its row into a ring; a window of lines that is whole is filtered along
+ * columns, which makes a line of the next pass. So what passes hand each other stays in the caches, and the tests of the geometry that all
+ * of them share are made once. */
 #include "gi/filter.h"
 #include "gi/kernel_table.h"
 #include "gi/lit.h"
 #include "platform/simd.h"
 #include "raster/pack.h"
+
+/* One block. Columns are counted from the first one that any pass reads, `left` of the image; pass p makes those from margin · (p + 1) on. */
+typedef struct sweep {
+    const es_filter_job* job;
+    es_filter_scratch* s;
+    uint32_t planes;                          /* that are filtered */
+    int64_t left;
+    uint32_t margin, ring;                    /* columns that taps reach beyond the pixels, up to whole eights; lines kept of the geometry, less one */
+    uint32_t x0;                              /* the block's */
+    float depth_step, normal_step2;           /* what neighbours may differ by (find_even) */
+    uint32_t next[ES_FILTER_MAX_PASSES], end[ES_FILTER_MAX_PASSES]; /* lines that each pass has still to make */
+} sweep;
 
 /* Column (or row) i of `count`, which may lie outside by less than n: the place n further in; -1 when that is outside as well. */
 static int64_t folded(int64_t i, int64_t count, int64_t n)
@@ -13,182 +29,239 @@ static int64_t folded(int64_t i, int64_t count, int64_t n)
     return i >= 0 && i < count ? i : -1;
 }
 
-/* Column x, outside the image, of a line whose taps are [begin, end) */
-static void fold(const es_filter_job* job, es_filter_scratch* s, uint32_t planes, int64_t x, int64_t begin, int64_t end)
+/* The lines that taps of line y fall on: the window, moved into the image. */
+static uint32_t first_line(const es_filter_job* job, uint32_t y)
 {
-    const size_t at = (size_t)(x - begin);
-    const int64_t from = folded(x, job->gbuffer->width, job->size);
-    /* what folds to a place beyond the margin is not a tap of any pixel of the block; -1 may lie within it, and is no place */
-    const bool here = from >= 0 && from >= begin && from < end;
-    const size_t copy = here ? (size_t)(from - begin) : 0;
-    s->depth_in[at] = here ? s->depth_in[copy] : -1e30f; /* close to no depth */
-    for (int k = 0; k < 3; k++) s->normal_in[k][at] = here ? s->normal_in[k][copy] : 0.0f;
-    for (uint32_t k = 0; k < planes; k++) s->in[k][at] = here ? s->in[k][copy] : 0.0f;
+    const uint32_t n = job->size, height = job->gbuffer->height, first = y > n / 2 ? y - n / 2 : 0;
+    return first + n > height ? (height > n ? height - n : 0) : first;
+}
+static uint32_t end_line(const es_filter_job* job, uint32_t y)
+{
+    const uint32_t end = first_line(job, y) + job->size;
+    return end < job->gbuffer->height ? end : job->gbuffer->height;
 }
 
-/* Taps of one line: columns [x0 - margin, x0 + ES_FILTER_COLUMNS + margin) of row y. */
-static void load_line(const es_filter_job* job, uint32_t x0, uint32_t y, uint32_t planes, es_filter_scratch* s)
+/* Columns [begin, end) that pass p reads, of the image or not, and those that it makes. */
+static uint32_t reads_from(const sweep* w, uint32_t p) { return w->margin * p; }
+static uint32_t reads_to(const sweep* w, uint32_t p) { return ES_FILTER_COLUMNS + w->margin * (2 * w->job->passes - p); }
+static uint32_t makes_from(const sweep* w, uint32_t p)
 {
-    const es_gbuffer* g = job->gbuffer;
+    const uint32_t from = reads_from(w, p + 1);
+    return w->left + from < 0 ? (uint32_t)-w->left : from;
+}
+static uint32_t makes_to(const sweep* w, uint32_t p)
+{
+    const uint32_t to = reads_to(w, p + 1), last = (uint32_t)((int64_t)((w->job->gbuffer->width + VW - 1) / VW * VW) - w->left);
+    return to < last ? to : last;
+}
+
+/* Fills what a pass reads outside the image. What folds to a place beyond the block is not a tap of any of its pixels. */
+static void fold(const sweep* w, uint32_t p, float* line, float nothing)
+{
+    const int64_t from = w->left + reads_from(w, p), to = w->left + reads_to(w, p), width = w->job->gbuffer->width, n = w->job->size;
+    for (int64_t x = from < 0 ? from : width > from ? width : from; x < to; x++) {
+        if (x == 0) x = width; /* the left side is done */
+        if (x >= to) break;
+        const int64_t place = folded(x, width, n);
+        line[x - w->left] = place >= from && place < to ? line[place - w->left] : nothing;
+    }
+}
+
+static void load_line(const sweep* w, uint32_t y)
+{
+    const es_gbuffer* g = w->job->gbuffer;
+    es_filter_scratch* s = w->s;
     const size_t row = (size_t)y * g->stride;
-    const int64_t begin = (int64_t)x0 - ES_FILTER_MARGIN, end = (int64_t)x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN;
+    const uint32_t line = y & w->ring, to = reads_to(w, 0);
     /* strides are multiples of eight */
-    for (int64_t x = begin; x < end; x += VW) {
+    for (uint32_t at = 0; at < to; at += VW) {
+        const int64_t x = w->left + at;
         if (x < 0 || x >= g->stride) continue;
-        size_t at = (size_t)(x - begin);
         vf nx, ny, nz;
         es_unpack_normal_v(vi_load(g->normal + row + x), &nx, &ny, &nz);
-        vf_store(s->depth_in + at, vf_load(g->depth + row + x));
-        vf_store(s->normal_in[0] + at, nx);
-        vf_store(s->normal_in[1] + at, ny);
-        vf_store(s->normal_in[2] + at, nz);
-        for (uint32_t k = 0; k < planes; k++) vf_store(s->in[k] + at, vf_load(job->source[k] + row + x));
+        vf_store(s->depth[line] + at, vf_load(g->depth + row + x));
+        vf_store(s->normal[line][0] + at, nx);
+        vf_store(s->normal[line][1] + at, ny);
+        vf_store(s->normal[line][2] + at, nz);
+        for (uint32_t k = 0; k < w->planes; k++) vf_store(s->in[0][k] + at, vf_load(w->job->source[k] + row + x));
     }
-    for (int64_t x = begin; x < 0; x++) fold(job, s, planes, x, begin, end);
-    for (int64_t x = begin > g->width ? begin : g->width; x < end; x++) fold(job, s, planes, x, begin, end);
+    fold(w, 0, s->depth[line], -1e30f); /* close to no depth */
+    for (int k = 0; k < 3; k++) fold(w, 0, s->normal[line][k], 0.0f);
+    for (uint32_t k = 0; k < w->planes; k++) fold(w, 0, s->in[0][k], 0.0f);
+    s->depth[line][to] = s->normal[line][0][to] = s->normal[line][1][to] = s->normal[line][2][to] = 0.0f; /* a neighbour of the last, for vectors */
 }
 
 /* ---- where all taps count ------------------------------------------------------------------------------------------------
  *
  * On an even surface no tap fails, and sums need no tests: the same additions in the same order. What follows finds such windows and misses
- * some. Eight pixels are compared with their first: normals at most SPAN / 6 away, depths an eighth of the threshold; the firsts of
- * neighbouring eights lie within SPAN / 3 and a quarter; of a line and the one above within SPAN / 4 / 16. So no two normals of a window are
- * farther apart than SPAN, whose unit vectors have a dot product of 1 - SPAN² / 2, a thousandth above the threshold, and no two depths farther than
- * three quarters of what they may. */
+ * some, by neighbours: a tap is at most h = n / 2 steps from its centre. If none of them changes the depth by more than the share
+ * (t - t²/2) / h of the nearer one's, all h change it by less than exp(t - t²/2) <= 1 + t. If none moves the normal's end by more than SPAN / h, unit
+ * vectors h steps apart have a dot product of 1 - SPAN² / 2 at least, a thousandth above the threshold. Where depths rise faster, their
+ * least and greatest are compared. */
 
-typedef struct closeness { float flat2, beside2, above2, depth; bool any; } closeness;
-
-static closeness closeness_of(const es_filter_job* job)
+static void set_steps(sweep* w)
 {
-    const float span2 = 2.0f * (0.999f - job->normal_threshold);
-    return (closeness){span2 * (1.0f / 36.0f), span2 * (1.0f / 9.0f), span2 * (1.0f / 4096.0f), job->depth_threshold, span2 > 0.0f && job->depth_threshold < 0.1f};
+    const float t = w->job->depth_threshold, steps = w->job->size > 3 ? (float)(w->job->size / 2) : 1.0f, span2 = 2.0f * (0.999f - w->job->normal_threshold);
+    w->depth_step = t <= 1.0f ? 0.999f * (t - 0.5f * t * t) / steps : 0.0f;
+    w->normal_step2 = span2 > 0.0f ? span2 / (steps * steps) : -1.0f;
 }
 
-static float apart2(const float a[3], const float b[3]) { return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]); }
-
-static void find_even(const closeness* c, es_filter_scratch* s, uint32_t columns, uint32_t line)
+/* Which of eight normals and depths pass both tests with their neighbours', and which normals do. */
+VINL void compare(const sweep* w, const float* depth, const float (*normal)[ES_FILTER_STRIDE], const float* depth2, const float (*normal2)[ES_FILTER_STRIDE], vm* normals, vm* both)
 {
-    bool flat[ES_FILTER_STRIDE / VW], normals[ES_FILTER_STRIDE / VW], linked[ES_FILTER_STRIDE / VW];
-    float first[ES_FILTER_STRIDE / VW][4];
-    const uint32_t begin = ES_FILTER_MARGIN / VW - 1, end = begin + columns / VW + 2;
-    for (uint32_t v = begin; v < end && c->any; v++) {
+    const vf x = vf_load(normal2[0]) - vf_load(normal[0]), y = vf_load(normal2[1]) - vf_load(normal[1]), z = vf_load(normal2[2]) - vf_load(normal[2]);
+    const vf a = vf_load(depth), b = vf_load(depth2);
+    *normals = vm_le(x * x + y * y + z * z, vf_set1(w->normal_step2));
+    *both = *normals & vm_le(vf_abs(b - a), vf_min(a, b) * vf_set1(w->depth_step));
+}
+
+static void find_even(const sweep* w, uint32_t y, bool first)
+{
+    es_filter_scratch* s = w->s;
+    const uint32_t line = y & w->ring, above = (y - 1) & w->ring, groups = reads_to(w, 0) / VW, n = w->job->size;
+    /* window of eight pixels: n + 7 columns, of which the first is n / 2 before theirs */
+    const uint32_t pairs = ((1u << (n + 6)) - 1u) << (8 - n / 2);
+    uint32_t bits[ES_FILTER_GROUPS + 2] = {0}; /* neighbours to the right that pass */
+    for (uint32_t v = 0; v < groups; v++) {
         const uint32_t at = v * VW;
-        const float d = first[v][3] = s->depth_in[at];
-        for (int k = 0; k < 3; k++) first[v][k] = s->normal_in[k][at];
-        vf x = vf_load(s->normal_in[0] + at) - vf_set1(first[v][0]), y = vf_load(s->normal_in[1] + at) - vf_set1(first[v][1]), z = vf_load(s->normal_in[2] + at) - vf_set1(first[v][2]);
-        normals[v] = d > 0.0f && !vm_any(~vm_le(x * x + y * y + z * z, vf_set1(c->flat2)));
-        flat[v] = normals[v] && !vm_any(~vm_le(vf_abs(vf_load(s->depth_in + at) - vf_set1(d)), vf_set1(d * c->depth * 0.125f)));
-        if (v == begin) continue;
-        const float low = d < first[v - 1][3] ? d : first[v - 1][3];
-        linked[v] = flat[v] && flat[v - 1] && __builtin_fabsf(d - first[v - 1][3]) <= low * c->depth * 0.25f && apart2(first[v], first[v - 1]) <= c->beside2;
-    }
-    for (uint32_t v = begin + 1; v + 1 < end; v++) {
-        s->even[v] = c->any && linked[v] && linked[v + 1];
-        const uint32_t k = v - begin - 1;
-        uint8_t like = c->any && normals[v];
-        if (like && line) {
-            const float above[3] = {s->normal[0][line - 1][k * VW], s->normal[1][line - 1][k * VW], s->normal[2][line - 1][k * VW]};
-            if (s->like[line - 1][k] && apart2(first[v], above) <= c->above2) like = (uint8_t)(s->like[line - 1][k] + 1);
+        vm normals, both;
+        compare(w, s->depth[line] + at, (const float(*)[ES_FILTER_STRIDE]) & s->normal[line][0][at], s->depth[line] + at + 1, (const float(*)[ES_FILTER_STRIDE]) & s->normal[line][0][at + 1], &normals, &both);
+        bits[v + 1] = vm_bits(both);
+        uint8_t alike = 1, alike_normals = 1;
+        if (!first) {
+            compare(w, s->depth[line] + at, (const float(*)[ES_FILTER_STRIDE]) & s->normal[line][0][at], s->depth[above] + at, (const float(*)[ES_FILTER_STRIDE]) & s->normal[above][0][at], &normals, &both);
+            if (vm_all(normals)) alike_normals = s->alike_normals[above][v] < 255 ? (uint8_t)(s->alike_normals[above][v] + 1) : 255;
+            if (vm_all(both)) alike = s->alike[above][v] < 255 ? (uint8_t)(s->alike[above][v] + 1) : 255;
         }
-        s->like[line][k] = like;
+        s->alike[line][v] = alike;
+        s->alike_normals[line][v] = alike_normals;
     }
+    bits[groups] &= 0x7f; /* the last column has no neighbour */
+    for (uint32_t v = 0; v < groups; v++) s->even[line][v] = ((bits[v] | bits[v + 1] << 8 | bits[v + 2] << 16) & pairs) == pairs;
 }
 
-/* `planes` is a constant at every call */
-VINL void filter_even_row(const es_filter_job* job, const es_filter_scratch* s, uint32_t x, uint32_t line, es_filter_scratch* out, uint32_t planes)
+/* Lines `lines[0 … taps)`, whose normals are alike, and whose depths are when `all`: false when they are not, with nothing written. */
+VINL bool filter_even_column(const sweep* w, uint32_t p, const uint32_t* lines, uint32_t taps, uint32_t at, bool all, float* const out[6], uint32_t shift, uint32_t planes)
 {
-    const int32_t n = (int32_t)job->size;
-    const uint32_t c = x + ES_FILTER_MARGIN;
-    vf sum[6];
-    for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
-    for (int32_t i = -(n / 2); i < n - n / 2; i++)
-        for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(s->in[k] + (uint32_t)((int32_t)c + i));
-    const vf share = vf_set1(1.0f) / vf_set1((float)n);
-    vf_store(out->depth[line] + x, vf_load(s->depth_in + c));
-    for (int k = 0; k < 3; k++) vf_store(out->normal[k][line] + x, vf_load(s->normal_in[k] + c));
-    for (uint32_t k = 0; k < planes; k++) vf_store(out->mid[k][line] + x, sum[k] * share);
-}
-
-/* Lines [first, first + taps), all of whose normals are alike: false when a depth fails, with nothing written. */
-VINL bool filter_even_column(const es_filter_job* job, const es_filter_scratch* s, uint32_t first, uint32_t taps, uint32_t x, size_t out, uint32_t planes)
-{
-    vf low = vf_load(s->depth[first] + x), high = low;
-    for (uint32_t i = 1; i < taps; i++) {
-        const vf d = vf_load(s->depth[first + i] + x);
-        low = vf_min(low, d);
-        high = vf_max(high, d);
+    const es_filter_scratch* s = w->s;
+    if (!all) {
+        vf low = vf_load(s->depth[lines[0] & w->ring] + at), high = low;
+        for (uint32_t i = 1; i < taps; i++) {
+            const vf d = vf_load(s->depth[lines[i] & w->ring] + at);
+            low = vf_min(low, d);
+            high = vf_max(high, d);
+        }
+        if (!vm_all(vm_le(high - low, low * vf_set1(w->job->depth_threshold)))) return false;
     }
-    if (vm_any(~vm_le(high - low, low * vf_set1(job->depth_threshold)))) return false;
     vf sum[6];
     for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
     for (uint32_t i = 0; i < taps; i++)
-        for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(s->mid[k][first + i] + x);
+        for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(s->mid[p][lines[i] % ES_FILTER_MAX][k] + at);
     const vf share = vf_set1(1.0f) / vf_set1((float)taps);
-    for (uint32_t k = 0; k < planes; k++) vf_store(job->result[k] + out + x, sum[k] * share);
+    for (uint32_t k = 0; k < planes; k++) vf_store(out[k] + (at - shift), sum[k] * share);
     return true;
 }
 
-/* `planes` is a constant at every call */
-VINL void filter_row(const es_filter_job* job, const es_filter_scratch* s, uint32_t columns, uint32_t line, es_filter_scratch* out, uint32_t planes)
+/* ---- a pass ------------------------------------------------------------------------------------------------------------------ */
+
+/* `planes` is a constant at every call of what follows */
+VINL void filter_row(const sweep* w, uint32_t p, uint32_t y, uint32_t planes)
 {
-    const int32_t n = (int32_t)job->size;
-    const vf depth_threshold = vf_set1(job->depth_threshold), normal_threshold = vf_set1(job->normal_threshold), one = vf_set1(1.0f);
-    for (uint32_t x = 0; x < columns; x += VW) {
-        const uint32_t c = x + ES_FILTER_MARGIN;
-        if (s->even[c / VW]) {
-            filter_even_row(job, s, x, line, out, planes);
-            continue;
-        }
-        vf depth = vf_load(s->depth_in + c), limit = depth * depth_threshold;
-        vf nx = vf_load(s->normal_in[0] + c), ny = vf_load(s->normal_in[1] + c), nz = vf_load(s->normal_in[2] + c);
-        vf sum[6], count = vf_zero();
+    es_filter_scratch* s = w->s;
+    const int32_t n = (int32_t)w->job->size;
+    const vf depth_threshold = vf_set1(w->job->depth_threshold), normal_threshold = vf_set1(w->job->normal_threshold), one = vf_set1(1.0f);
+    const uint32_t line = y & w->ring, to = makes_to(w, p);
+    const float* depths = s->depth[line];
+    float(*normals)[ES_FILTER_STRIDE] = s->normal[line], (*mid)[ES_FILTER_STRIDE] = s->mid[p][y % ES_FILTER_MAX], (*in)[ES_FILTER_STRIDE] = s->in[p];
+    for (uint32_t c = makes_from(w, p); c < to; c += VW) {
+        vf sum[6], share;
         for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
-        for (int32_t i = -(n / 2); i < n - n / 2; i++) {
-            const uint32_t t = (uint32_t)((int32_t)c + i);
-            vf dot = nx * vf_load(s->normal_in[0] + t) + ny * vf_load(s->normal_in[1] + t) + nz * vf_load(s->normal_in[2] + t);
-            vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth_in + t) - depth), limit);
-            if (i == 0) counts = vm_all_lanes();
-            count = count + vf_and(counts, one);
-            for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(s->in[k] + t));
+        if (s->even[line][c / VW]) {
+            const uint32_t begin = c - (uint32_t)(n / 2);
+            for (uint32_t t = begin; t < begin + (uint32_t)n; t++)
+                for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(in[k] + t);
+            share = one / vf_set1((float)n);
+        } else {
+            const vf depth = vf_load(depths + c), limit = depth * depth_threshold, nx = vf_load(normals[0] + c), ny = vf_load(normals[1] + c), nz = vf_load(normals[2] + c);
+            vf count = vf_zero();
+            for (int32_t i = -(n / 2); i < n - n / 2; i++) {
+                const uint32_t t = (uint32_t)((int32_t)c + i);
+                vf dot = nx * vf_load(normals[0] + t) + ny * vf_load(normals[1] + t) + nz * vf_load(normals[2] + t);
+                vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(depths + t) - depth), limit);
+                if (i == 0) counts = vm_all_lanes();
+                count = count + vf_and(counts, one);
+                for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(in[k] + t));
+            }
+            share = one / count;
         }
-        vf share = one / count;
-        vf_store(out->depth[line] + x, depth);
-        vf_store(out->normal[0][line] + x, nx);
-        vf_store(out->normal[1][line] + x, ny);
-        vf_store(out->normal[2][line] + x, nz);
-        for (uint32_t k = 0; k < planes; k++) vf_store(out->mid[k][line] + x, sum[k] * share);
+        for (uint32_t k = 0; k < planes; k++) vf_store(mid[k] + c, sum[k] * share);
     }
 }
 
-/* lines[0 … taps): those of the window, `centre` is the pixel's own */
-VINL void filter_column(const es_filter_job* job, const es_filter_scratch* s, const uint32_t* lines, uint32_t taps, uint32_t centre, uint32_t columns, size_t out, uint32_t planes)
+/* `shift`: the column that out[] begins with */
+VINL void filter_column(const sweep* w, uint32_t p, uint32_t y, float* const out[6], uint32_t shift, uint32_t planes)
 {
+    const es_filter_scratch* s = w->s;
+    const es_filter_job* job = w->job;
     const vf depth_threshold = vf_set1(job->depth_threshold), normal_threshold = vf_set1(job->normal_threshold), one = vf_set1(1.0f);
+    uint32_t lines[ES_FILTER_MAX], taps = 0;
+    for (uint32_t i = 0; i < job->size; i++) {
+        int64_t from = folded((int64_t)y - job->size / 2 + i, job->gbuffer->height, job->size);
+        if (from >= 0) lines[taps++] = (uint32_t)from;
+    }
     const bool in_turn = lines[taps - 1] == lines[0] + taps - 1;
-    for (uint32_t x = 0; x < columns; x += VW) {
-        if (in_turn && s->like[lines[taps - 1]][x / VW] >= taps && filter_even_column(job, s, lines[0], taps, x, out, planes)) continue;
-        vf depth = vf_load(s->depth[centre] + x), limit = depth * depth_threshold;
-        vf nx = vf_load(s->normal[0][centre] + x), ny = vf_load(s->normal[1][centre] + x), nz = vf_load(s->normal[2][centre] + x);
+    const uint32_t last = lines[taps - 1] & w->ring, centre = y & w->ring, to = makes_to(w, p);
+    for (uint32_t c = makes_from(w, p); c < to; c += VW) {
+        const bool alike = s->alike[last][c / VW] >= taps;
+        if (in_turn && (alike || s->alike_normals[last][c / VW] >= taps) && filter_even_column(w, p, lines, taps, c, alike, out, shift, planes)) continue;
+        vf depth = vf_load(s->depth[centre] + c), limit = depth * depth_threshold;
+        vf nx = vf_load(s->normal[centre][0] + c), ny = vf_load(s->normal[centre][1] + c), nz = vf_load(s->normal[centre][2] + c);
         vf sum[6], count = vf_zero();
         for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
         for (uint32_t i = 0; i < taps; i++) {
-            const uint32_t t = lines[i];
-            vf dot = nx * vf_load(s->normal[0][t] + x) + ny * vf_load(s->normal[1][t] + x) + nz * vf_load(s->normal[2][t] + x);
-            vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth[t] + x) - depth), limit);
+            const uint32_t t = lines[i] & w->ring;
+            vf dot = nx * vf_load(s->normal[t][0] + c) + ny * vf_load(s->normal[t][1] + c) + nz * vf_load(s->normal[t][2] + c);
+            vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth[t] + c) - depth), limit);
             if (t == centre) counts = vm_all_lanes();
             count = count + vf_and(counts, one);
-            for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(s->mid[k][t] + x));
+            for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(s->mid[p][lines[i] % ES_FILTER_MAX][k] + c));
         }
         vf share = one / count;
-        for (uint32_t k = 0; k < planes; k++) vf_store(job->result[k] + out + x, sum[k] * share);
+        for (uint32_t k = 0; k < planes; k++) vf_store(out[k] + (c - shift), sum[k] * share);
     }
 }
 
-/* Lobes are rare: where a block's taps of planes 3 … 5 are all zero, so are their means. */
-static bool lobes_are_dark(const es_filter_job* job, uint32_t x0, uint32_t first, uint32_t end)
+/* Line y of what pass p reads has come: makes the lines whose windows it completes. */
+static void pass_line(sweep* w, uint32_t p, uint32_t y)
 {
+    const es_filter_job* job = w->job;
+    if (w->planes == 3) filter_row(w, p, y, 3);
+    else if (w->planes == 6) filter_row(w, p, y, 6);
+    else filter_row(w, p, y, w->planes);
+    while (w->next[p] < w->end[p] && end_line(job, w->next[p]) <= y + 1) {
+        const uint32_t made = w->next[p]++;
+        const bool final = p + 1 == job->passes;
+        const uint32_t shift = final ? w->margin * job->passes : 0;
+        float* out[6];
+        for (uint32_t k = 0; k < w->planes; k++) out[k] = final ? job->result[k] + ((size_t)made * job->gbuffer->stride + w->x0) : w->s->in[p + 1][k];
+        if (w->planes == 3) filter_column(w, p, made, out, shift, 3);
+        else if (w->planes == 6) filter_column(w, p, made, out, shift, 6);
+        else filter_column(w, p, made, out, shift, w->planes);
+        if (final) continue;
+        for (uint32_t k = 0; k < w->planes; k++) fold(w, p + 1, w->s->in[p + 1][k], 0.0f);
+        pass_line(w, p + 1, made);
+    }
+}
+
+/* ---- a block ------------------------------------------------------------------------------------------------------------------ */
+
+/* Lobes are rare: where a block's taps of planes 3 … 5 are all zero, so are their means. */
+static bool lobes_are_dark(const sweep* w, uint32_t first, uint32_t end)
+{
+    const es_filter_job* job = w->job;
     const es_gbuffer* g = job->gbuffer;
-    const uint32_t begin = x0 > ES_FILTER_MARGIN ? x0 - ES_FILTER_MARGIN : 0, stop = x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN < g->stride ? x0 + ES_FILTER_COLUMNS + ES_FILTER_MARGIN : g->stride;
+    const int64_t right = w->left + reads_to(w, 0);
+    const uint32_t begin = w->left > 0 ? (uint32_t)w->left : 0, stop = right < g->stride ? (uint32_t)right : g->stride;
     if (job->source_lit) return !es_lit_within(job->source_lit, es_lit_chunks(g->stride), begin, stop, first, end);
     for (uint32_t y = first; y < end; y++) {
         const size_t row = (size_t)y * g->stride;
@@ -214,46 +287,34 @@ _Static_assert((int)ES_FILTER_COLUMNS == (int)ES_LIT_COLUMNS, "blocks share no c
 void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0, es_filter_scratch* s)
 {
     const es_gbuffer* g = job->gbuffer;
-    const uint32_t n = job->size;
     const uint32_t y1 = g->height - y0 < ES_FILTER_ROWS ? g->height : y0 + ES_FILTER_ROWS;
-    const uint32_t columns = g->width - x0 < ES_FILTER_COLUMNS ? (g->width - x0 + VW - 1) / VW * VW : ES_FILTER_COLUMNS;
-    /* rows that taps of this block fall on, folded ones included */
-    const uint32_t inner = n - n / 2 - 1;
-    uint32_t first = y0 > n / 2 ? y0 - n / 2 : 0, end = y1 + inner;
-    if (end > g->height) {
-        end = g->height;
-        if (first > (end > n ? end - n : 0)) first = end > n ? end - n : 0;
+    sweep w = {.job = job, .s = s, .planes = job->plane_count, .x0 = x0, .margin = (job->size + VW - 2) / VW * VW};
+    w.left = (int64_t)x0 - w.margin * job->passes;
+    w.ring = 1;
+    while (w.ring < job->size * job->passes) w.ring *= 2;
+    w.ring--;
+    set_steps(&w);
+    /* what the last pass is to make, what it needs for that, and so on */
+    uint32_t first = y0, end = y1;
+    for (uint32_t p = job->passes; p-- > 0;) {
+        w.next[p] = first;
+        w.end[p] = end;
+        first = first_line(job, first);
+        end = end_line(job, end - 1);
     }
-    if (end < n) end = n < g->height ? n : g->height;
-
-    const closeness close = closeness_of(job);
-    uint32_t planes = job->plane_count;
-    if (planes == 6 && lobes_are_dark(job, x0, first, end)) {
-        planes = 3;
+    if (w.planes == 6 && lobes_are_dark(&w, first, end)) {
+        w.planes = 3;
+        const uint32_t columns = makes_to(&w, job->passes - 1) - makes_from(&w, job->passes - 1);
         for (uint32_t y = y0; y < y1; y++) {
             if (!set_lit(job, x0, y, 0)) continue;
             for (uint32_t k = 3; k < 6; k++)
                 for (uint32_t x = 0; x < columns; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x0 + x, vf_zero());
         }
     }
-    for (uint32_t y = y0; y < y1 && planes == 6; y++) set_lit(job, x0, y, 1);
-
+    for (uint32_t y = y0; y < y1 && w.planes == 6; y++) set_lit(job, x0, y, 1);
     for (uint32_t y = first; y < end; y++) {
-        load_line(job, x0, y, planes, s);
-        find_even(&close, s, columns, y - first);
-        if (planes == 3) filter_row(job, s, columns, y - first, s, 3);
-        else if (planes == 6) filter_row(job, s, columns, y - first, s, 6);
-        else filter_row(job, s, columns, y - first, s, planes);
-    }
-    for (uint32_t y = y0; y < y1; y++) {
-        uint32_t lines[ES_FILTER_MAX], taps = 0;
-        for (uint32_t i = 0; i < n; i++) {
-            int64_t from = folded((int64_t)y - n / 2 + i, g->height, n);
-            if (from >= 0) lines[taps++] = (uint32_t)from - first;
-        }
-        size_t out = (size_t)y * g->stride + x0;
-        if (planes == 3) filter_column(job, s, lines, taps, y - first, columns, out, 3);
-        else if (planes == 6) filter_column(job, s, lines, taps, y - first, columns, out, 6);
-        else filter_column(job, s, lines, taps, y - first, columns, out, planes);
+        load_line(&w, y);
+        find_even(&w, y, y == first);
+        pass_line(&w, 0, y);
     }
 }
