@@ -40,10 +40,9 @@ typedef struct es_filter_scratch {
     float in[ES_FILTER_MAX_PASSES][6][ES_FILTER_STRIDE];                /* a pass' latest line */
     float mid[ES_FILTER_MAX_PASSES][ES_FILTER_MAX][6][ES_FILTER_STRIDE]; /* its lines, filtered along rows */
     float depth[ES_FILTER_LINES][ES_FILTER_STRIDE], normal[ES_FILTER_LINES][3][ES_FILTER_STRIDE];
-    /* Of eight columns of a line: passes every pair of taps within a row's window both tests; in how many lines up to this one do neighbours
-     * above each other, and in how many do their normals. */
+    /* Of eight columns of a line: do all taps of the row's windows count; and how many lines, this one the last, are each like the one above. */
     bool even[ES_FILTER_LINES][ES_FILTER_GROUPS];
-    uint8_t alike[ES_FILTER_LINES][ES_FILTER_GROUPS], alike_normals[ES_FILTER_LINES][ES_FILTER_GROUPS];
+    uint8_t alike[ES_FILTER_LINES][ES_FILTER_GROUPS];
 } es_filter_scratch;
 
 #endif

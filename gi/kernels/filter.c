@@ -96,8 +96,7 @@ static void load_line(const sweep* w, uint32_t y)
  * On an even surface no tap fails, and sums need no tests: the same additions in the same order. What follows finds such windows and misses
  * some, by neighbours: a tap is at most h = n / 2 steps from its centre. If none of them changes the depth by more than the share
  * (t - t²/2) / h of the nearer one's, all h change it by less than exp(t - t²/2) <= 1 + t. If none moves the normal's end by more than SPAN / h, unit
- * vectors h steps apart have a dot product of 1 - SPAN² / 2 at least, a thousandth above the threshold. Where depths rise faster, their
- * least and greatest are compared. */
+ * vectors h steps apart have a dot product of 1 - SPAN² / 2 at least, a thousandth above the threshold. */
 
 static void set_steps(sweep* w)
 {
@@ -106,13 +105,14 @@ static void set_steps(sweep* w)
     w->normal_step2 = span2 > 0.0f ? span2 / (steps * steps) : -1.0f;
 }
 
-/* Which of eight normals and depths pass both tests with their neighbours', and which normals do. */
-VINL void compare(const sweep* w, const float* depth, const float (*normal)[ES_FILTER_STRIDE], const float* depth2, const float (*normal2)[ES_FILTER_STRIDE], vm* normals, vm* both)
+/* Which of eight pixels are like those of other places. */
+VINL vm alike(const sweep* w, uint32_t line, uint32_t at, uint32_t line2, uint32_t at2)
 {
-    const vf x = vf_load(normal2[0]) - vf_load(normal[0]), y = vf_load(normal2[1]) - vf_load(normal[1]), z = vf_load(normal2[2]) - vf_load(normal[2]);
-    const vf a = vf_load(depth), b = vf_load(depth2);
-    *normals = vm_le(x * x + y * y + z * z, vf_set1(w->normal_step2));
-    *both = *normals & vm_le(vf_abs(b - a), vf_min(a, b) * vf_set1(w->depth_step));
+    const es_filter_scratch* s = w->s;
+    const vf x = vf_load(s->normal[line2][0] + at2) - vf_load(s->normal[line][0] + at), y = vf_load(s->normal[line2][1] + at2) - vf_load(s->normal[line][1] + at),
+             z = vf_load(s->normal[line2][2] + at2) - vf_load(s->normal[line][2] + at);
+    const vf a = vf_load(s->depth[line] + at), b = vf_load(s->depth[line2] + at2);
+    return vm_le(x * x + y * y + z * z, vf_set1(w->normal_step2)) & vm_le(vf_abs(b - a), vf_min(a, b) * vf_set1(w->depth_step));
 }
 
 static void find_even(const sweep* w, uint32_t y, bool first)
@@ -124,71 +124,49 @@ static void find_even(const sweep* w, uint32_t y, bool first)
     uint32_t bits[ES_FILTER_GROUPS + 2] = {0}; /* neighbours to the right that pass */
     for (uint32_t v = 0; v < groups; v++) {
         const uint32_t at = v * VW;
-        vm normals, both;
-        compare(w, s->depth[line] + at, (const float(*)[ES_FILTER_STRIDE]) & s->normal[line][0][at], s->depth[line] + at + 1, (const float(*)[ES_FILTER_STRIDE]) & s->normal[line][0][at + 1], &normals, &both);
-        bits[v + 1] = vm_bits(both);
-        uint8_t alike = 1, alike_normals = 1;
-        if (!first) {
-            compare(w, s->depth[line] + at, (const float(*)[ES_FILTER_STRIDE]) & s->normal[line][0][at], s->depth[above] + at, (const float(*)[ES_FILTER_STRIDE]) & s->normal[above][0][at], &normals, &both);
-            if (vm_all(normals)) alike_normals = s->alike_normals[above][v] < 255 ? (uint8_t)(s->alike_normals[above][v] + 1) : 255;
-            if (vm_all(both)) alike = s->alike[above][v] < 255 ? (uint8_t)(s->alike[above][v] + 1) : 255;
-        }
-        s->alike[line][v] = alike;
-        s->alike_normals[line][v] = alike_normals;
+        bits[v + 1] = vm_bits(alike(w, line, at, line, at + 1));
+        const bool follows = !first && vm_all(alike(w, line, at, above, at));
+        s->alike[line][v] = !follows ? 1 : s->alike[above][v] < ES_FILTER_MAX ? (uint8_t)(s->alike[above][v] + 1) : ES_FILTER_MAX;
     }
     bits[groups] &= 0x7f; /* the last column has no neighbour */
     for (uint32_t v = 0; v < groups; v++) s->even[line][v] = ((bits[v] | bits[v + 1] << 8 | bits[v + 2] << 16) & pairs) == pairs;
 }
 
-/* Lines `lines[0 … taps)`, whose normals are alike, and whose depths are when `all`: false when they are not, with nothing written. */
-VINL bool filter_even_column(const sweep* w, uint32_t p, const uint32_t* lines, uint32_t taps, uint32_t at, bool all, float* const out[6], uint32_t shift, uint32_t planes)
-{
-    const es_filter_scratch* s = w->s;
-    if (!all) {
-        vf low = vf_load(s->depth[lines[0] & w->ring] + at), high = low;
-        for (uint32_t i = 1; i < taps; i++) {
-            const vf d = vf_load(s->depth[lines[i] & w->ring] + at);
-            low = vf_min(low, d);
-            high = vf_max(high, d);
-        }
-        if (!vm_all(vm_le(high - low, low * vf_set1(w->job->depth_threshold)))) return false;
-    }
-    vf sum[6];
-    for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
-    for (uint32_t i = 0; i < taps; i++)
-        for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(s->mid[p][lines[i] % ES_FILTER_MAX][k] + at);
-    const vf share = vf_set1(1.0f) / vf_set1((float)taps);
-    for (uint32_t k = 0; k < planes; k++) vf_store(out[k] + (at - shift), sum[k] * share);
-    return true;
-}
-
 /* ---- a pass ------------------------------------------------------------------------------------------------------------------ */
 
-/* `planes` is a constant at every call of what follows */
-VINL void filter_row(const sweep* w, uint32_t p, uint32_t y, uint32_t planes)
+/* `planes` and n, the window's side, are constants at most calls of what follows. */
+
+/* Sums of n taps, all of which count, at column c. */
+VINL void add_even(const float* const taps[], uint32_t n, uint32_t c, vf sum[6], uint32_t planes)
+{
+    for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
+#pragma GCC unroll 16
+    for (uint32_t i = 0; i < n; i++)
+        for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(taps[i] + k * ES_FILTER_STRIDE + c);
+}
+
+VINL void filter_row(const sweep* w, uint32_t p, uint32_t y, uint32_t planes, uint32_t n)
 {
     es_filter_scratch* s = w->s;
-    const int32_t n = (int32_t)w->job->size;
-    const vf depth_threshold = vf_set1(w->job->depth_threshold), normal_threshold = vf_set1(w->job->normal_threshold), one = vf_set1(1.0f);
+    const vf depth_threshold = vf_set1(w->job->depth_threshold), normal_threshold = vf_set1(w->job->normal_threshold), one = vf_set1(1.0f), even_share = one / vf_set1((float)n);
     const uint32_t line = y & w->ring, to = makes_to(w, p);
     const float* depths = s->depth[line];
     float(*normals)[ES_FILTER_STRIDE] = s->normal[line], (*mid)[ES_FILTER_STRIDE] = s->mid[p][y % ES_FILTER_MAX], (*in)[ES_FILTER_STRIDE] = s->in[p];
+    const float* taps[ES_FILTER_MAX];
+    for (uint32_t i = 0; i < n; i++) taps[i] = in[0] + i;
     for (uint32_t c = makes_from(w, p); c < to; c += VW) {
-        vf sum[6], share;
-        for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
+        vf sum[6], share = even_share;
         if (s->even[line][c / VW]) {
-            const uint32_t begin = c - (uint32_t)(n / 2);
-            for (uint32_t t = begin; t < begin + (uint32_t)n; t++)
-                for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_load(in[k] + t);
-            share = one / vf_set1((float)n);
+            add_even(taps, n, c - n / 2, sum, planes);
         } else {
             const vf depth = vf_load(depths + c), limit = depth * depth_threshold, nx = vf_load(normals[0] + c), ny = vf_load(normals[1] + c), nz = vf_load(normals[2] + c);
             vf count = vf_zero();
-            for (int32_t i = -(n / 2); i < n - n / 2; i++) {
-                const uint32_t t = (uint32_t)((int32_t)c + i);
+            for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
+            for (uint32_t i = 0; i < n; i++) {
+                const uint32_t t = c - n / 2 + i;
                 vf dot = nx * vf_load(normals[0] + t) + ny * vf_load(normals[1] + t) + nz * vf_load(normals[2] + t);
                 vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(depths + t) - depth), limit);
-                if (i == 0) counts = vm_all_lanes();
+                if (i == n / 2) counts = vm_all_lanes();
                 count = count + vf_and(counts, one);
                 for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(in[k] + t));
             }
@@ -198,35 +176,34 @@ VINL void filter_row(const sweep* w, uint32_t p, uint32_t y, uint32_t planes)
     }
 }
 
-/* `shift`: the column that out[] begins with */
-VINL void filter_column(const sweep* w, uint32_t p, uint32_t y, float* const out[6], uint32_t shift, uint32_t planes)
+/* `lines` are those that the taps fall on, of which the first `taps` are in the image; `shift`: the column that out[] begins with. */
+VINL void filter_column(const sweep* w, uint32_t p, uint32_t y, const uint32_t* lines, uint32_t taps, float* const out[6], uint32_t shift, uint32_t planes)
 {
     const es_filter_scratch* s = w->s;
-    const es_filter_job* job = w->job;
-    const vf depth_threshold = vf_set1(job->depth_threshold), normal_threshold = vf_set1(job->normal_threshold), one = vf_set1(1.0f);
-    uint32_t lines[ES_FILTER_MAX], taps = 0;
-    for (uint32_t i = 0; i < job->size; i++) {
-        int64_t from = folded((int64_t)y - job->size / 2 + i, job->gbuffer->height, job->size);
-        if (from >= 0) lines[taps++] = (uint32_t)from;
-    }
+    const vf depth_threshold = vf_set1(w->job->depth_threshold), normal_threshold = vf_set1(w->job->normal_threshold), one = vf_set1(1.0f), even_share = one / vf_set1((float)taps);
     const bool in_turn = lines[taps - 1] == lines[0] + taps - 1;
     const uint32_t last = lines[taps - 1] & w->ring, centre = y & w->ring, to = makes_to(w, p);
+    const float* mid[ES_FILTER_MAX];
+    for (uint32_t i = 0; i < taps; i++) mid[i] = s->mid[p][lines[i] % ES_FILTER_MAX][0];
     for (uint32_t c = makes_from(w, p); c < to; c += VW) {
-        const bool alike = s->alike[last][c / VW] >= taps;
-        if (in_turn && (alike || s->alike_normals[last][c / VW] >= taps) && filter_even_column(w, p, lines, taps, c, alike, out, shift, planes)) continue;
-        vf depth = vf_load(s->depth[centre] + c), limit = depth * depth_threshold;
-        vf nx = vf_load(s->normal[centre][0] + c), ny = vf_load(s->normal[centre][1] + c), nz = vf_load(s->normal[centre][2] + c);
-        vf sum[6], count = vf_zero();
-        for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
-        for (uint32_t i = 0; i < taps; i++) {
-            const uint32_t t = lines[i] & w->ring;
-            vf dot = nx * vf_load(s->normal[t][0] + c) + ny * vf_load(s->normal[t][1] + c) + nz * vf_load(s->normal[t][2] + c);
-            vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth[t] + c) - depth), limit);
-            if (t == centre) counts = vm_all_lanes();
-            count = count + vf_and(counts, one);
-            for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(s->mid[p][lines[i] % ES_FILTER_MAX][k] + c));
+        vf sum[6], share = even_share;
+        if (in_turn && s->alike[last][c / VW] >= taps) {
+            add_even(mid, taps, c, sum, planes);
+        } else {
+            const vf depth = vf_load(s->depth[centre] + c), limit = depth * depth_threshold;
+            const vf nx = vf_load(s->normal[centre][0] + c), ny = vf_load(s->normal[centre][1] + c), nz = vf_load(s->normal[centre][2] + c);
+            vf count = vf_zero();
+            for (uint32_t k = 0; k < planes; k++) sum[k] = vf_zero();
+            for (uint32_t i = 0; i < taps; i++) {
+                const uint32_t t = lines[i] & w->ring;
+                vf dot = nx * vf_load(s->normal[t][0] + c) + ny * vf_load(s->normal[t][1] + c) + nz * vf_load(s->normal[t][2] + c);
+                vm counts = vm_ge(dot, normal_threshold) & vm_le(vf_abs(vf_load(s->depth[t] + c) - depth), limit);
+                if (t == centre) counts = vm_all_lanes();
+                count = count + vf_and(counts, one);
+                for (uint32_t k = 0; k < planes; k++) sum[k] = sum[k] + vf_and(counts, vf_load(mid[i] + k * ES_FILTER_STRIDE + c));
+            }
+            share = one / count;
         }
-        vf share = one / count;
         for (uint32_t k = 0; k < planes; k++) vf_store(out[k] + (c - shift), sum[k] * share);
     }
 }
@@ -235,18 +212,25 @@ VINL void filter_column(const sweep* w, uint32_t p, uint32_t y, float* const out
 static void pass_line(sweep* w, uint32_t p, uint32_t y)
 {
     const es_filter_job* job = w->job;
-    if (w->planes == 3) filter_row(w, p, y, 3);
-    else if (w->planes == 6) filter_row(w, p, y, 6);
-    else filter_row(w, p, y, w->planes);
+    if (w->planes == 3 && job->size == 8) filter_row(w, p, y, 3, 8);
+    else if (w->planes == 3) filter_row(w, p, y, 3, job->size);
+    else if (w->planes == 6) filter_row(w, p, y, 6, job->size);
+    else filter_row(w, p, y, w->planes, job->size);
     while (w->next[p] < w->end[p] && end_line(job, w->next[p]) <= y + 1) {
         const uint32_t made = w->next[p]++;
-        const bool final = p + 1 == job->passes;
+        const bool final = p + 1 == job->passes || p + 1 == ES_FILTER_MAX_PASSES;
         const uint32_t shift = final ? w->margin * job->passes : 0;
         float* out[6];
         for (uint32_t k = 0; k < w->planes; k++) out[k] = final ? job->result[k] + ((size_t)made * job->gbuffer->stride + w->x0) : w->s->in[p + 1][k];
-        if (w->planes == 3) filter_column(w, p, made, out, shift, 3);
-        else if (w->planes == 6) filter_column(w, p, made, out, shift, 6);
-        else filter_column(w, p, made, out, shift, w->planes);
+        uint32_t lines[ES_FILTER_MAX], taps = 0;
+        for (uint32_t i = 0; i < job->size; i++) {
+            const int64_t from = folded((int64_t)made - job->size / 2 + i, job->gbuffer->height, job->size);
+            if (from >= 0) lines[taps++] = (uint32_t)from;
+        }
+        if (w->planes == 3 && taps == 8) filter_column(w, p, made, lines, 8, out, shift, 3);
+        else if (w->planes == 3) filter_column(w, p, made, lines, taps, out, shift, 3);
+        else if (w->planes == 6) filter_column(w, p, made, lines, taps, out, shift, 6);
+        else filter_column(w, p, made, lines, taps, out, shift, w->planes);
         if (final) continue;
         for (uint32_t k = 0; k < w->planes; k++) fold(w, p + 1, w->s->in[p + 1][k], 0.0f);
         pass_line(w, p + 1, made);
