@@ -44,9 +44,10 @@ static inline vf display_range(vf a) { return vf_min(vf_max(a, vf_zero()), vf_se
 static inline vi srgb8(const es_srgb_table* table, vf a) { return vi_gather(table->code, vi_round(vf_sqrt(a) * vf_set1((float)(ES_SRGB_TABLE_SIZE - 1)))); }
 
 /* From its parts; stores the indirect one where it is wanted. */
-VINL rgb_v radiance_at(const es_compose_job* job, size_t at)
+VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y)
 {
     const es_gbuffer* g = job->gbuffer;
+    const size_t at = (size_t)y * g->stride + x;
     vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at), surface = vi_load(g->surface + at);
     rgb_v albedo = {es_unpack_unorm16_v(rg), es_unpack_unorm16_v(vi_shift_right_logical(rg, 16)), es_unpack_unorm16_v(b)};
     rgb_v c;
@@ -68,7 +69,7 @@ VINL rgb_v radiance_at(const es_compose_job* job, size_t at)
         indirect.g = albedo.g * diffuse * vf_load(job->irradiance[1] + at);
         indirect.b = albedo.b * diffuse * vf_load(job->irradiance[2] + at);
     }
-    if (job->specular[0] && (!job->lit || job->lit[(at / g->stride) * es_lit_chunks(g->stride) + at % g->stride / ES_LIT_COLUMNS] & 1)) {
+    if (job->specular[0] && (!job->lit || job->lit[(size_t)y * es_lit_chunks(g->stride) + x / ES_LIT_COLUMNS] & 1)) {
         indirect.r = indirect.r + vf_load(job->specular[0] + at);
         indirect.g = indirect.g + vf_load(job->specular[1] + at);
         indirect.b = indirect.b + vf_load(job->specular[2] + at);
@@ -96,7 +97,7 @@ void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uin
     for (uint32_t y = row_begin; y < row_end; y++) {
         for (uint32_t x = 0; x < g->width; x += VW) {
             size_t at = (size_t)y * g->stride + x;
-            rgb_v c = job->finished[0] ? (rgb_v){vf_load(job->finished[0] + at), vf_load(job->finished[1] + at), vf_load(job->finished[2] + at)} : radiance_at(job, at);
+            rgb_v c = job->finished[0] ? (rgb_v){vf_load(job->finished[0] + at), vf_load(job->finished[1] + at), vf_load(job->finished[2] + at)} : radiance_at(job, x, y);
             if (job->radiance[0]) {
                 vf_store(job->radiance[0] + at, c.r);
                 vf_store(job->radiance[1] + at, c.g);

@@ -146,20 +146,30 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                     }
                     strength = vf_and(lanes, strength * share);
                     if (vm_any(vm_gt(strength, zero))) {
-                        vf vx, vy, vz;
-                        if (rays->orthographic) {
-                            vx = vf_set1(-rays->dir[0]);
-                            vy = vf_set1(-rays->dir[1]);
-                            vz = vf_set1(-rays->dir[2]);
-                        } else {
-                            vf inverse = vf_set1(-1.0f) / vf_sqrt(dx * dx + dy * dy + dz * dz);
-                            vx = dx * inverse;
-                            vy = dy * inverse;
-                            vz = dz * inverse;
-                        }
-                        es_lift_to_horizon_v(nx, ny, nz, &vx, &vy, &vz);
+                        const vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at);
                         vf fr, fg, fb;
-                        es_surface_reflect_gbuffer_v(vi_load(g->albedo_rg + at), vi_load(g->albedo_b + at), surface_word, nx, ny, nz, lx, ly, lz, vx, vy, vz, &fr, &fg, &fb);
+                        if (vm_all(~lanes | es_surface_word_is_diffuse_v(surface_word))) {
+                            /* what the model comes to without a lobe, wherever the eye is: the same bits */
+                            const vf share = vf_set1(0.318309886f);
+                            const es_surface_v s = es_surface_of_gbuffer_v(rg, b, surface_word);
+                            fr = s.albedo[0] * share;
+                            fg = s.albedo[1] * share;
+                            fb = s.albedo[2] * share;
+                        } else {
+                            vf vx, vy, vz;
+                            if (rays->orthographic) {
+                                vx = vf_set1(-rays->dir[0]);
+                                vy = vf_set1(-rays->dir[1]);
+                                vz = vf_set1(-rays->dir[2]);
+                            } else {
+                                vf inverse = vf_set1(-1.0f) / vf_sqrt(dx * dx + dy * dy + dz * dz);
+                                vx = dx * inverse;
+                                vy = dy * inverse;
+                                vz = dz * inverse;
+                            }
+                            es_lift_to_horizon_v(nx, ny, nz, &vx, &vy, &vz);
+                            es_surface_reflect_gbuffer_v(rg, b, surface_word, nx, ny, nz, lx, ly, lz, vx, vy, vz, &fr, &fg, &fb);
+                        }
                         /* irradiance of the light times the model; cos is in the irradiance */
                         vf e = strength * vf_max(cosine, zero);
                         out_r = vf_and(lanes, e * vf_set1(light->radiant[0]) * fr);

@@ -94,6 +94,12 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 vf_store(batch->direction[1] + at, spread_number(job, index, 0xc2b2ae35u, 2360945575u));
             }
             if (!with_lobes) continue;
+            const vi word = vi_gather(g->surface + row, x);
+            if (!job->near && vm_all(~seen | es_surface_word_is_diffuse_v(word))) {
+                batch->lobed[at / VW] = false; /* nor is anything read of what follows, but these */
+                for (int k = 0; k < 3; k++) vf_store(batch->s[k] + at, zero);
+                continue;
+            }
             vf v[3];
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
             vf s = vf_set1(1.0f) / vf_sqrt(vf_max(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], vf_set1(1e-30f))); /* unseen pixels lie in the eye */
@@ -102,7 +108,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             vf_store(batch->vx + at, vf_and(seen, v[0]));
             vf_store(batch->vy + at, vf_and(seen, v[1]));
             vf_store(batch->vz + at, vf_and(seen, v[2]));
-            es_surface_v surface = es_surface_of_gbuffer_v(vi_gather(g->albedo_rg + row, x), vi_gather(g->albedo_b + row, x), vi_gather(g->surface + row, x));
+            es_surface_v surface = es_surface_of_gbuffer_v(vi_gather(g->albedo_rg + row, x), vi_gather(g->albedo_b + row, x), word);
             vm lobed = vi_zero();
             for (int k = 0; k < 3; k++) {
                 lobed |= seen & vm_gt(surface.specular[k], zero);

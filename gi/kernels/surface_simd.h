@@ -30,6 +30,9 @@ VINL es_surface_v es_surface_of_gbuffer_v(vi albedo_rg, vi albedo_b, vi word)
     return s;
 }
 
+/* Does a surface of this G-buffer word reflect nothing but what its albedo does, whatever its colour? */
+VINL vm es_surface_word_is_diffuse_v(vi word) { return vi_eq(word & vi_set1(0x00ff00ff), vi_zero()); }
+
 VINL void es_surface_parts_v(const es_surface_v* s, vf nx, vf ny, vf nz, vf ix, vf iy, vf iz, vf ox, vf oy, vf oz, vf* pass, vf lobe[3])
 {
     const vf zero = vf_zero(), one = vf_set1(1.0f);
