@@ -57,43 +57,98 @@ VINL rgb history_at(const es_antialias_job* job, uint32_t x, uint32_t y, vf expo
     return sum;
 }
 
+/* ---- the range of what is new ------------------------------------------------------------------------------------------- */
+
+/* Columns of a strip, a vector more on either side. Its rows are made once and pass through here: three of them as a display shows them, and
+ * of the row in their middle the range over the three, of which a pixel's is that of three columns. */
+enum { STRIP = 128, STRIP_FLOATS = STRIP + 2 * VW };
+typedef struct strip {
+    uint32_t first, end;       /* columns that are made, whole vectors */
+    uint32_t x0;               /* the column at index VW */
+    float rows[3][3][STRIP_FLOATS], low[3][STRIP_FLOATS], high[3][STRIP_FLOATS];
+} strip;
+
+static void start_strip(strip* s, const es_gbuffer* g, uint32_t x0)
+{
+    s->x0 = x0;
+    s->first = x0 ? x0 - VW : 0;
+    s->end = x0 + STRIP + VW < g->stride ? x0 + STRIP + VW : g->stride;
+}
+
+/* Row y, to the place of row y mod 3. */
+static void make_row(const es_antialias_job* job, strip* s, uint32_t y)
+{
+    const es_gbuffer* g = job->gbuffer;
+    const vf exposure = vf_set1(job->exposure_scale);
+    for (uint32_t x = s->first; x < s->end; x += VW) {
+        const rgb c = shown(load(job->source, (size_t)y * g->stride + x), exposure);
+        for (int k = 0; k < 3; k++) vf_store(s->rows[y % 3][k] + x + VW - s->x0, c.at[k]);
+    }
+    for (int k = 0; k < 3; k++) { /* beside the picture's border its nearest pixel stands in */
+        float* row = s->rows[y % 3][k] + VW;
+        if (!s->x0) row[-1] = row[0];
+        if (g->width <= s->x0 + STRIP) row[g->width - s->x0] = row[g->width - s->x0 - 1];
+    }
+}
+
+static void make_range(const es_gbuffer* g, strip* s, uint32_t y)
+{
+    const uint32_t above = (y ? y - 1 : y) % 3, here = y % 3, below = (y + 1 < g->height ? y + 1 : y) % 3;
+    for (int k = 0; k < 3; k++)
+        for (uint32_t i = 0; i < STRIP_FLOATS; i += VW) {
+            const vf a = vf_load(s->rows[above][k] + i), b = vf_load(s->rows[here][k] + i), c = vf_load(s->rows[below][k] + i);
+            vf_store(s->low[k] + i, vf_min(vf_min(a, b), c));
+            vf_store(s->high[k] + i, vf_max(vf_max(a, b), c));
+        }
+}
+
+/* ---- rows -------------------------------------------------------------------------------------------------------------- */
+
+/* Eight pixels; `new` is what there is of them now, as shown. */
+VINL void resolve(const es_antialias_job* job, uint32_t x, uint32_t y, rgb new, const strip* range)
+{
+    const size_t at = (size_t)y * job->gbuffer->stride + x;
+    const vf exposure = vf_set1(job->exposure_scale);
+    vm known;
+    rgb old = history_at(job, x, y, exposure, &known);
+    for (int k = 0; k < 3 && range; k++) {
+        const float *low = range->low[k] + (x + VW - range->x0), *high = range->high[k] + (x + VW - range->x0);
+        const vf least = vf_min(vf_min(vf_load(low - 1), vf_load(low)), vf_load(low + 1)), most = vf_max(vf_max(vf_load(high - 1), vf_load(high)), vf_load(high + 1));
+        old.at[k] = vf_min(vf_max(old.at[k], least), most);
+    }
+    const vf share = vf_select(known, vf_set1(job->blend), vf_set1(1.0f));
+    rgb mixed;
+    for (int k = 0; k < 3; k++) mixed.at[k] = old.at[k] + share * (new.at[k] - old.at[k]);
+    mixed = unshown(mixed, exposure);
+    for (int k = 0; k < 3; k++) vf_store(job->result[k] + at, vf_and(vm_gt(mixed.at[k], vf_set1(ES_TINY)), mixed.at[k]));
+}
+
 void ES_KERNEL(es_gi_antialias)(const es_antialias_job* job, uint32_t row_begin, uint32_t row_end)
 {
     const es_gbuffer* g = job->gbuffer;
-    const vf exposure = vf_set1(job->exposure_scale), blend = vf_set1(job->blend);
-    for (uint32_t y = row_begin; y < row_end; y++) {
-        const uint32_t rows[3] = {y ? y - 1 : y, y, y + 1 < g->height ? y + 1 : y};
-        for (uint32_t x = 0; x < g->width; x += VW) {
-            const size_t at = (size_t)y * g->stride + x;
-            const rgb fresh = load(job->source, at);
-            if (!job->history[0]) {
-                for (int k = 0; k < 3; k++) vf_store(job->result[k] + at, fresh.at[k]);
-                continue;
+    if (!job->history[0]) {
+        const size_t first = (size_t)row_begin * g->stride, bytes = (size_t)(row_end - row_begin) * g->stride * sizeof(float);
+        for (int k = 0; k < 3; k++) memcpy(job->result[k] + first, job->source[k] + first, bytes);
+        return;
+    }
+    if (!job->clamp) {
+        for (uint32_t y = row_begin; y < row_end; y++)
+            for (uint32_t x = 0; x < g->width; x += VW) resolve(job, x, y, shown(load(job->source, (size_t)y * g->stride + x), vf_set1(job->exposure_scale)), NULL);
+        return;
+    }
+    strip s = {0};
+    for (uint32_t x0 = 0; x0 < g->width; x0 += STRIP) {
+        start_strip(&s, g, x0);
+        const uint32_t x1 = x0 + STRIP < g->width ? x0 + STRIP : g->width;
+        if (row_begin) make_row(job, &s, row_begin - 1);
+        make_row(job, &s, row_begin);
+        for (uint32_t y = row_begin; y < row_end; y++) {
+            if (y + 1 < g->height) make_row(job, &s, y + 1);
+            make_range(g, &s, y);
+            for (uint32_t x = x0; x < x1; x += VW) {
+                const size_t i = x + VW - x0;
+                resolve(job, x, y, (rgb){{vf_load(s.rows[y % 3][0] + i), vf_load(s.rows[y % 3][1] + i), vf_load(s.rows[y % 3][2] + i)}}, &s);
             }
-            const rgb here = shown(fresh, exposure);
-            vm known;
-            rgb old = history_at(job, x, y, exposure, &known);
-            if (job->clamp) {
-                const bool inner = x && x + VW < g->width;
-                rgb low = here, high = here;
-                for (int j = 0; j < 3; j++)
-                    for (int i = 0; i < 3; i++) {
-                        if (i == 1 && j == 1) continue;
-                        const size_t row = (size_t)rows[j] * g->stride;
-                        const vi column = vi_min(vi_max(vi_set1((int32_t)x + i - 1) + vi_iota(), vi_zero()), vi_set1((int32_t)g->width - 1));
-                        rgb tap = shown(inner ? load(job->source, row + x + (uint32_t)i - 1) : gather(job->source, vi_set1((int32_t)row) + column), exposure);
-                        for (int k = 0; k < 3; k++) {
-                            low.at[k] = vf_min(low.at[k], tap.at[k]);
-                            high.at[k] = vf_max(high.at[k], tap.at[k]);
-                        }
-                    }
-                for (int k = 0; k < 3; k++) old.at[k] = vf_min(vf_max(old.at[k], low.at[k]), high.at[k]);
-            }
-            const vf share = vf_select(known, blend, vf_set1(1.0f));
-            rgb mixed;
-            for (int k = 0; k < 3; k++) mixed.at[k] = old.at[k] + share * (here.at[k] - old.at[k]);
-            mixed = unshown(mixed, exposure);
-            for (int k = 0; k < 3; k++) vf_store(job->result[k] + at, vf_and(vm_gt(mixed.at[k], vf_set1(ES_TINY)), mixed.at[k]));
         }
     }
 }
