@@ -40,16 +40,35 @@ void es_antialias_jitter(es_raster_view* view, const float place[2])
     move_projection(&view->previous_projection, x, y);
 }
 
+/* A picture is composed and blended a few rows at a time, while they are near; where two bands meet, once both are composed. */
+enum { BAND = 32, STEP = 8 };
+
 typedef struct antialias_loop { const es_gi_kernels* kernels; const es_antialias_job* job; } antialias_loop;
 
-static void rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+static void bands(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
-    antialias_loop* loop = user;
-    loop->kernels->antialias(loop->job, begin, end);
+    const antialias_loop* loop = user;
+    const uint32_t height = loop->job->gbuffer->height, last = end * BAND < height ? end * BAND : height;
+    uint32_t blended = begin ? begin * BAND + 1 : 0;
+    for (uint32_t y = begin * BAND; y < last; y += STEP) {
+        const uint32_t composed = y + STEP < last ? y + STEP : last, whole = composed == height ? height : composed - 1;
+        if (loop->job->compose) loop->kernels->compose(loop->job->compose, y, composed);
+        if (whole > blended) loop->kernels->antialias(loop->job, blended, whole);
+        blended = whole > blended ? whole : blended;
+    }
+}
+
+/* The rows on both sides of where bands 1, 2 … begin. */
+static void seams(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const antialias_loop* loop = user;
+    for (uint32_t i = begin; i < end; i++) loop->kernels->antialias(loop->job, (i + 1) * BAND - 1, (i + 1) * BAND + 1);
 }
 
 void es_antialias_resolve(es_context* context, const es_antialias_job* job)
 {
     antialias_loop loop = {es_gi_kernel_table(es_context_isa(context)), job};
-    es_parallel_for(context, job->gbuffer->height, 8, rows, &loop);
+    const uint32_t count = (job->gbuffer->height + BAND - 1) / BAND;
+    es_parallel_for(context, count, 1, bands, &loop);
+    if (count > 1) es_parallel_for(context, count - 1, 4, seams, &loop);
 }

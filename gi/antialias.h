@@ -15,6 +15,7 @@
 #ifndef EARTHSHINE_GI_ANTIALIAS_H
 #define EARTHSHINE_GI_ANTIALIAS_H
 
+#include "gi/compose.h"
 #include "gi/gi.h"
 #include "platform/context.h"
 
@@ -32,6 +33,7 @@ typedef struct es_antialias_job {
     float blend;                   /* share of the new picture: 1 where there is no history */
     float exposure_scale;          /* of the luminance above */
     const float* source[3];        /* the new picture, rows of the G-buffer's stride */
+    const es_compose_job* compose; /* writes it, as its radiance; NULL: it is there */
     const float* history[3];       /* NULL: none */
     float* result[3];              /* none of the others unless there is no history */
 } es_antialias_job;
