@@ -225,8 +225,9 @@ VINL void history_there(const es_temporal_job* job, size_t at, vf column, vf row
     for (uint32_t k = 0; k < planes; k++) h->light[k] = h->light[k] * share;
 }
 
-/* Of pixels [x0, x1) of row y; all of one chunk. `planes`, `with_history` and `still` (none of them has moved) are constants at every call. */
-VINL void blend_pixels(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y, const float* resets, uint32_t planes, uint32_t with_history, bool still)
+/* Of pixels [x0, x1) of row y; all of one chunk. `planes`, `with_history` and `still` (none of them has moved) are constants at every call. Returns
+ * whether a lobe reflects anything. */
+VINL bool blend_pixels(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y, const float* resets, uint32_t planes, uint32_t with_history, bool still)
 {
     const es_gbuffer* g = job->gbuffer;
     const vf zero = vf_zero(), one = vf_set1(1.0f), row = vf_set1((float)y);
@@ -235,6 +236,7 @@ VINL void blend_pixels(const es_temporal_job* job, uint32_t x0, uint32_t x1, uin
     const vf exposure = vf_set1(job->exposure_scale);
     const depth_line depths = depths_of_row(job, y);
     const bool confidence_only = !job->result[0];
+    vm lobes = vi_zero();
     vf column = vf_set1((float)x0) + vf_iota();
     for (uint32_t x = x0; x < x1; x += VW, column = column + vf_set1((float)VW)) {
         const size_t at = (size_t)y * g->stride + x;
@@ -275,7 +277,9 @@ VINL void blend_pixels(const es_temporal_job* job, uint32_t x0, uint32_t x1, uin
         }
         if (job->confidence) vf_store(job->confidence + at, confidence);
         for (uint32_t k = 0; k < planes && !confidence_only; k++) vf_store(job->result[k] + at, fresh[k]);
+        for (uint32_t k = 3; k < planes; k++) lobes |= vm_ne(fresh[k], zero);
     }
+    return vm_any(lobes);
 }
 
 /* How far the pixels [x0, x1) of row y have moved: whole pixels that their taps lie to the left, right, above and below. False: too far to tell. */
@@ -318,12 +322,23 @@ static bool reach_of(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint3
     return true;
 }
 
+/* Flags are spread by the filter, by blocks that are far wider than its reach: where they are set, a look at the planes is worth its while. */
+static bool source_is_dark(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y)
+{
+    const uint32_t stride = job->gbuffer->stride;
+    if (!es_lit_within(job->source_lit, es_lit_chunks(stride), x0, x1, y, y + 1)) return true;
+    vi bits = vi_zero();
+    for (uint32_t k = 3; k < 6; k++)
+        for (uint32_t x = x0; x < x1; x += VW) bits |= vi_load(job->source[k] + (size_t)y * stride + x);
+    return !vm_any(~vi_eq(bits, vi_zero()));
+}
+
 /* Does what lobes reflect there, and all of the history that their movement leads to, hold zeros alone? */
 static bool lobes_are_dark(const es_temporal_job* job, uint32_t x0, uint32_t x1, uint32_t y, const reach* r)
 {
     const es_gbuffer* g = job->gbuffer;
     const uint32_t chunks = es_lit_chunks(g->stride);
-    if (es_lit_within(job->source_lit, chunks, x0, x1, y, y + 1)) return false;
+    if (!source_is_dark(job, x0, x1, y)) return false;
     if (job->history_count < 6) return true;
     if (r->still) return !es_lit_within(job->history_lit, chunks, x0, x1, y, y + 1);
     return !es_lit_within(job->history_lit, chunks, x0 > r->left ? x0 - r->left : 0, x1 + r->right, y > r->up ? y - r->up : 0, y + r->down + 1 < g->height ? y + r->down + 1 : g->height);
@@ -338,18 +353,16 @@ static void blend_row(const es_temporal_job* job, uint32_t y, const float* reset
         const uint32_t x1 = x0 + ES_LIT_COLUMNS < g->width ? x0 + ES_LIT_COLUMNS : g->width;
         reach r;
         const bool near = reach_of(job, x0, x1, y, &r), dark = lit && near && lobes_are_dark(job, x0, x1, y, &r);
+        bool lobes = false;
         if (job->plane_count == 3 || dark) {
             if (r.still) blend_pixels(job, x0, x1, y, resets, 3, 3, true);
             else blend_pixels(job, x0, x1, y, resets, 3, 3, false);
-        } else if (job->history_count == 6) {
-            if (r.still) blend_pixels(job, x0, x1, y, resets, 6, 6, true);
-            else blend_pixels(job, x0, x1, y, resets, 6, 6, false);
-        } else if (r.still) blend_pixels(job, x0, x1, y, resets, 6, 3, true);
-        else blend_pixels(job, x0, x1, y, resets, 6, 3, false);
+        } else if (job->history_count == 6) lobes = r.still ? blend_pixels(job, x0, x1, y, resets, 6, 6, true) : blend_pixels(job, x0, x1, y, resets, 6, 6, false);
+        else lobes = r.still ? blend_pixels(job, x0, x1, y, resets, 6, 3, true) : blend_pixels(job, x0, x1, y, resets, 6, 3, false);
         if (!lit || !job->result[0]) continue;
         for (uint32_t k = 3; k < 6 && dark && lit[x0 / ES_LIT_COLUMNS] & 1; k++)
             for (uint32_t x = x0; x < x1; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x, vf_zero());
-        lit[x0 / ES_LIT_COLUMNS] = !dark;
+        lit[x0 / ES_LIT_COLUMNS] = lobes;
     }
 }
 
