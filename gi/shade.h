@@ -105,7 +105,7 @@ enum { ES_SHADE_LANES = 4096, ES_SHADE_COLUMNS = 128 };
 struct es_shade_batch {
     float px[ES_SHADE_LANES], py[ES_SHADE_LANES], pz[ES_SHADE_LANES];
     float nx[ES_SHADE_LANES], ny[ES_SHADE_LANES], nz[ES_SHADE_LANES]; /* 0 where nothing is seen */
-    float e[3][ES_SHADE_LANES];
+    float* e[3];                                                       /* irradiance, of the phase among `words` */
     /* with lobes */
     float vx[ES_SHADE_LANES], vy[ES_SHADE_LANES], vz[ES_SHADE_LANES];  /* unit, to the eye */
     float f0[3][ES_SHADE_LANES], roughness[ES_SHADE_LANES];
@@ -121,6 +121,8 @@ struct es_shade_batch {
     int32_t light[ES_SHADE_LANES];     /* the chosen one, -1: none sends anything */
     int32_t chosen[ES_SHADE_LANES];    /* its record, or -1 */
     float share[ES_SHADE_LANES];       /* W / luminance */
+    /* of each phase of the row: depth, normal and surface of the G-buffer until the phase is shaded, its irradiance then */
+    uint32_t words[3][ES_INTERLEAVE_MAX][ES_SHADE_LANES];
 };
 
 /* A block: columns [column, column + ES_SHADE_COLUMNS) and rows [row, row + rows) of each phase of phase row phase_y. */

@@ -313,6 +313,33 @@ VINL void vf_gather4(const void* base, uint32_t stride, vi index, vf* a, vf* b, 
 }
 /* Eight records of four floats one after another, transposed in and out. */
 VINL void vf_load4(const float* p, vf* a, vf* b, vf* c, vf* d) { vf_gather4(p, 16, vi_iota(), a, b, c, d); }
+/* Eight vectors: lane i of vector j changes places with lane j of vector i. */
+VINL void vf_transpose8(vf v[8])
+{
+#if defined(ES_SIMD_256)
+    __m256 t[8], u[8];
+    for (int i = 0; i < 8; i += 2) {
+        t[i] = _mm256_unpacklo_ps((__m256)v[i], (__m256)v[i + 1]);
+        t[i + 1] = _mm256_unpackhi_ps((__m256)v[i], (__m256)v[i + 1]);
+    }
+    for (int i = 0; i < 8; i += 4)
+        for (int j = 0; j < 2; j++) {
+            u[i + 2 * j] = _mm256_shuffle_ps(t[i + j], t[i + j + 2], 0x44);
+            u[i + 2 * j + 1] = _mm256_shuffle_ps(t[i + j], t[i + j + 2], 0xee);
+        }
+    for (int i = 0; i < 4; i++) {
+        v[i] = (vf)_mm256_permute2f128_ps(u[i], u[i + 4], 0x20);
+        v[i + 4] = (vf)_mm256_permute2f128_ps(u[i], u[i + 4], 0x31);
+    }
+#else
+    for (int i = 0; i < VW; i++)
+        for (int j = 0; j < i; j++) {
+            const float a = v[i][j];
+            v[i][j] = v[j][i];
+            v[j][i] = a;
+        }
+#endif
+}
 VINL void vf_store4(float* p, vf a, vf b, vf c, vf d)
 {
 #if defined(ES_SIMD_256)

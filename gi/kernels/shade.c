@@ -1,13 +1,14 @@
 /* Interleaved shading (gi/shade.h): one block of the image, all phases of one phase row.
  *
- * The pixels of a phase are gathered from the G-buffer into a batch (position, unit normal, sums), all lights of the phase are
- * applied to the batch one after another, and the sums are scattered back. A light's constants stay in registers and its map in
+ * What the G-buffer's rows hold is split into phases; of each, a batch is made (position, unit normal, sums), all lights of the phase are
+ * applied to it one after another, and the sums are put together to rows again. A light's constants stay in registers and its map in
  * the caches while it passes over the batch. Eight pixels that the light cannot reach (behind it, or facing away) cost nine
  * multiplications and a branch.
  */
 #include <stddef.h>
 
 #include "gi/kernel_table.h"
+#include "gi/kernels/phases_simd.h"
 #include "gi/kernels/surface_simd.h"
 #include "gi/lit.h"
 #include "gi/shade.h"
@@ -18,7 +19,8 @@
 /* m²: the square of what is closer would leave the range of floats */
 #define NEAREST2 0x1p-62f
 
-typedef struct lanes_of_phase { uint32_t x0, columns, lanes, y0, rows; } lanes_of_phase; /* lanes: columns rounded up to VW */
+/* lanes: of a row in the batch, the columns of the widest phase rounded up to VW */
+typedef struct lanes_of_phase { uint32_t x0, columns, lanes, y0, rows, phase_x; } lanes_of_phase;
 
 static void ray_origins(const uint32_t* geometric_normals, vi x, const vf p[3], float offset, es_shade_batch* batch, uint32_t at)
 {
@@ -67,13 +69,14 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
         }
         for (uint32_t i = 0; i < p->lanes; i += VW) {
             uint32_t at = j * p->lanes + i;
-            vm inside = vm_first((int32_t)(p->columns - i < VW ? p->columns - i : VW));
+            vm inside = vm_first((int32_t)p->columns - (int32_t)i);
             /* lanes past the end read the block's first column */
             vi x = vi_set1((int32_t)p->x0) + (inside & ((vi_iota() + vi_set1((int32_t)i)) * vi_set1((int32_t)n)));
             vf fx = vf_from_int(x);
-            vf depth = vf_gather(g->depth + row, x);
+            const vf depth = vf_from_bits(vi_load(batch->words[0][p->phase_x] + at));
+            const vi normal = vi_load(batch->words[1][p->phase_x] + at), word = vi_load(batch->words[2][p->phase_x] + at);
             vf nx, ny, nz, q[3];
-            es_unpack_normal_v(vi_gather(g->normal + row, x), &nx, &ny, &nz);
+            es_unpack_normal_v(normal, &nx, &ny, &nz);
             vm seen = inside & vm_gt(depth, zero);
             for (int k = 0; k < 3; k++) {
                 vf d = dir[k] + fx * vf_set1(rays->dir_dx[k]);
@@ -94,8 +97,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 vf_store(batch->direction[1] + at, spread_number(job, index, 0xc2b2ae35u, 2360945575u));
             }
             if (!with_lobes) continue;
-            const vi word = vi_gather(g->surface + row, x);
-            if (!job->near && vm_all(~seen | es_surface_word_is_diffuse_v(word))) {
+            if (vm_all(~seen | es_surface_word_is_diffuse_v(word))) {
                 batch->lobed[at / VW] = false; /* nor is anything read of what follows, but these */
                 for (int k = 0; k < 3; k++) vf_store(batch->s[k] + at, zero);
                 continue;
@@ -425,15 +427,14 @@ static void scatter_lobes(const es_shade_job* job, const lanes_of_phase* p, cons
 }
 
 /* A phase without lights. */
-static void darken(const es_shade_job* job, const lanes_of_phase* p)
+static void darken(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch)
 {
-    for (uint32_t j = 0; j < p->rows; j++) {
+    for (int k = 0; k < 3; k++) memset(batch->words[k][p->phase_x], 0, (size_t)p->lanes * p->rows * sizeof(uint32_t));
+    for (uint32_t j = 0; j < p->rows && job->specular[0]; j++) {
         const size_t row = (size_t)(p->y0 + j * job->interleave) * job->gbuffer->stride + p->x0;
         for (int k = 0; k < 3; k++)
-            for (uint32_t i = 0; i < p->columns; i++) {
-                job->irradiance[k][row + (size_t)i * job->interleave] = 0.0f;
-                if (job->specular[0] && (!job->lit || *lit_at(job, p->x0 + i * job->interleave, p->y0 + j * job->interleave) & 2)) job->specular[k][row + (size_t)i * job->interleave] = 0.0f;
-            }
+            for (uint32_t i = 0; i < p->columns; i++)
+                if (!job->lit || *lit_at(job, p->x0 + i * job->interleave, p->y0 + j * job->interleave) & 2) job->specular[k][row + (size_t)i * job->interleave] = 0.0f;
     }
 }
 
@@ -443,6 +444,7 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
     const size_t map_texels = (size_t)job->map_size * job->map_size;
     const uint32_t lit = job->vpl_count - job->dark_count;
     bool lobes = false;
+    for (int k = 0; k < 3; k++) batch->e[k] = (float*)batch->words[k][p->phase_x];
     gather(job, p, batch, job->specular[0] != NULL, &lobes);
     if (job->sampled) {
         choose_lights(job, lights, phase, batch, lanes);
@@ -464,7 +466,6 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         if (lobes && !job->visibility && !light->glossy) apply_light(job, light, map, batch, lanes, shadow, false, true, PIXELS_WITH_LOBES);
     }
     if (job->near) job->near->add(job->near, batch, lanes, lobes);
-    scatter(job->gbuffer, p, n, batch->e, job->irradiance);
     if (job->specular[0] && job->lit) scatter_lobes(job, p, batch);
     else if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);
 }
@@ -472,20 +473,24 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
 void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)
 {
     const es_gbuffer* g = job->gbuffer;
-    const uint32_t n = job->interleave;
+    const uint32_t n = job->interleave, x0 = block->column * n, y0 = block->phase_y + block->row * n;
+    if (x0 >= g->width || y0 >= g->height) return;
+    const uint32_t most = ES_SHADE_COLUMNS * n, width = g->width - x0 < most ? g->width - x0 : most; /* pixels of the block's rows */
+    const uint32_t rows_left = (g->height - y0 + n - 1) / n, rows = rows_left < block->rows ? rows_left : block->rows;
+    const uint32_t lanes = ((width + n - 1) / n + VW - 1) / VW * VW;
     if (job->lit) begin_lit(job, block);
-    for (uint32_t phase_x = 0; phase_x < n; phase_x++) {
-        if (phase_x >= g->width || block->phase_y >= g->height) break;
-        uint32_t columns = (g->width - phase_x + n - 1) / n, rows = (g->height - block->phase_y + n - 1) / n;
-        if (block->column >= columns || block->row >= rows) break;
-        lanes_of_phase p = {.x0 = phase_x + block->column * n, .y0 = block->phase_y + block->row * n};
-        p.columns = columns - block->column < ES_SHADE_COLUMNS ? columns - block->column : ES_SHADE_COLUMNS;
-        p.rows = rows - block->row < block->rows ? rows - block->row : block->rows;
-        p.lanes = (p.columns + VW - 1) / VW * VW;
-        if (phase_x + n * block->phase_y >= job->vpl_count && !job->near) {
-            darken(job, &p);
-            continue;
-        }
-        shade_phase(job, lights, &p, phase_x + n * block->phase_y, batch);
+    const bool any = n * block->phase_y < job->vpl_count || job->near; /* light in any phase of this row */
+    for (uint32_t j = 0; j < rows && any; j++) {
+        const size_t row = (size_t)(y0 + j * n) * g->stride + x0;
+        es_split_row(g->depth + row, width, n, batch->words[0][0] + j * lanes, ES_SHADE_LANES);
+        es_split_row(g->normal + row, width, n, batch->words[1][0] + j * lanes, ES_SHADE_LANES);
+        es_split_row(g->surface + row, width, n, batch->words[2][0] + j * lanes, ES_SHADE_LANES);
     }
+    for (uint32_t phase_x = 0; phase_x < n && phase_x < width; phase_x++) {
+        const lanes_of_phase p = {.x0 = x0 + phase_x, .columns = (width - phase_x + n - 1) / n, .lanes = lanes, .y0 = y0, .rows = rows, .phase_x = phase_x};
+        if (phase_x + n * block->phase_y >= job->vpl_count && !job->near) darken(job, &p, batch);
+        else shade_phase(job, lights, &p, phase_x + n * block->phase_y, batch);
+    }
+    for (uint32_t j = 0; j < rows; j++)
+        for (int k = 0; k < 3; k++) es_merge_row(batch->words[k][0] + j * lanes, ES_SHADE_LANES, width, n, job->irradiance[k] + (size_t)(y0 + j * n) * g->stride + x0);
 }
