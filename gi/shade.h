@@ -100,7 +100,8 @@ typedef struct es_shade_light {
 
 /* Pixels of one phase inside a block of the image: so many that a light's map comes from memory few times a frame, so few that they
  * and two maps fit the second-level cache. Rows of up to ES_SHADE_COLUMNS lanes, a multiple of eight. */
-enum { ES_SHADE_LANES = 4096, ES_SHADE_COLUMNS = 128 };
+enum { ES_SHADE_LANES = 4096, ES_SHADE_COLUMNS = 128,
+    ES_SHADE_PHASE_STRIDE = ES_SHADE_LANES + 16 }; /* phases begin at different places of a way of the cache */
 
 struct es_shade_batch {
     float px[ES_SHADE_LANES], py[ES_SHADE_LANES], pz[ES_SHADE_LANES];
@@ -122,7 +123,7 @@ struct es_shade_batch {
     int32_t chosen[ES_SHADE_LANES];    /* its record, or -1 */
     float share[ES_SHADE_LANES];       /* W / luminance */
     /* of each phase of the row: depth, normal and surface of the G-buffer until the phase is shaded, its irradiance then */
-    uint32_t words[3][ES_INTERLEAVE_MAX][ES_SHADE_LANES];
+    uint32_t words[3][ES_INTERLEAVE_MAX][ES_SHADE_PHASE_STRIDE];
 };
 
 /* A block: columns [column, column + ES_SHADE_COLUMNS) and rows [row, row + rows) of each phase of phase row phase_y. */

@@ -482,9 +482,9 @@ void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* light
     const bool any = n * block->phase_y < job->vpl_count || job->near; /* light in any phase of this row */
     for (uint32_t j = 0; j < rows && any; j++) {
         const size_t row = (size_t)(y0 + j * n) * g->stride + x0;
-        es_split_row(g->depth + row, width, n, batch->words[0][0] + j * lanes, ES_SHADE_LANES);
-        es_split_row(g->normal + row, width, n, batch->words[1][0] + j * lanes, ES_SHADE_LANES);
-        es_split_row(g->surface + row, width, n, batch->words[2][0] + j * lanes, ES_SHADE_LANES);
+        es_split_row(g->depth + row, width, n, batch->words[0][0] + j * lanes, ES_SHADE_PHASE_STRIDE);
+        es_split_row(g->normal + row, width, n, batch->words[1][0] + j * lanes, ES_SHADE_PHASE_STRIDE);
+        es_split_row(g->surface + row, width, n, batch->words[2][0] + j * lanes, ES_SHADE_PHASE_STRIDE);
     }
     for (uint32_t phase_x = 0; phase_x < n && phase_x < width; phase_x++) {
         const lanes_of_phase p = {.x0 = x0 + phase_x, .columns = (width - phase_x + n - 1) / n, .lanes = lanes, .y0 = y0, .rows = rows, .phase_x = phase_x};
@@ -492,5 +492,5 @@ void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* light
         else shade_phase(job, lights, &p, phase_x + n * block->phase_y, batch);
     }
     for (uint32_t j = 0; j < rows; j++)
-        for (int k = 0; k < 3; k++) es_merge_row(batch->words[k][0] + j * lanes, ES_SHADE_LANES, width, n, job->irradiance[k] + (size_t)(y0 + j * n) * g->stride + x0);
+        for (int k = 0; k < 3; k++) es_merge_row(batch->words[k][0] + j * lanes, ES_SHADE_PHASE_STRIDE, width, n, job->irradiance[k] + (size_t)(y0 + j * n) * g->stride + x0);
 }
