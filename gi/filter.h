@@ -30,7 +30,7 @@ es_result es_filter_geometry_aware(es_context* context, es_arena* arena, const e
 
 /* ---- between filter.c and its kernel ------------------------------------------------------------------------------------- */
 
-enum { ES_FILTER_COLUMNS = 128, ES_FILTER_ROWS = 128,
+enum { ES_FILTER_COLUMNS = 256, ES_FILTER_ROWS = 128,
     ES_FILTER_GROUPS = (ES_FILTER_COLUMNS + 2 * ES_FILTER_MAX_PASSES * ES_FILTER_MAX) / 8, /* of eight columns, with margins of taps */
     ES_FILTER_STRIDE = 8 * ES_FILTER_GROUPS + 16,  /* lines and planes begin at different places of a way of the cache */
     ES_FILTER_LINES = ES_FILTER_MAX_PASSES * ES_FILTER_MAX };

@@ -126,8 +126,12 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                     }
                 }
                 vf nx, ny, nz, gx, gy, gz;
-                es_unpack_normal_v(vi_load(g->normal + at), &nx, &ny, &nz);
-                es_unpack_normal_v(vi_load(g->geometric_normal + at), &gx, &gy, &gz);
+                const vi normal = vi_load(g->normal + at), geometric_normal = vi_load(g->geometric_normal + at);
+                es_unpack_normal_v(normal, &nx, &ny, &nz);
+                gx = nx;
+                gy = ny;
+                gz = nz;
+                if (!vm_all(vi_eq(normal, geometric_normal))) es_unpack_normal_v(geometric_normal, &gx, &gy, &gz);
                 vf cosine = nx * lx + ny * ly + nz * lz;
                 vf geometric = gx * lx + gy * ly + gz * lz;
                 /* the side of the triangle that faces away is in its own shadow, whatever the interpolated normal says */

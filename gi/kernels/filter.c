@@ -261,12 +261,16 @@ static bool lobes_are_dark(const sweep* w, uint32_t first, uint32_t end)
 static bool set_lit(const es_filter_job* job, uint32_t x0, uint32_t y, uint8_t now)
 {
     if (!job->result_lit) return true;
-    uint8_t* lit = job->result_lit + (size_t)y * es_lit_chunks(job->gbuffer->stride) + x0 / ES_LIT_COLUMNS;
-    const bool was = *lit & 1;
-    *lit = now;
+    const uint32_t chunks = es_lit_chunks(job->gbuffer->stride), first = x0 / ES_LIT_COLUMNS;
+    uint8_t* lit = job->result_lit + (size_t)y * chunks;
+    bool was = false;
+    for (uint32_t c = first; c < chunks && c < first + ES_FILTER_COLUMNS / ES_LIT_COLUMNS; c++) {
+        was |= lit[c] & 1;
+        lit[c] = now;
+    }
     return was;
 }
-_Static_assert((int)ES_FILTER_COLUMNS == (int)ES_LIT_COLUMNS, "blocks share no chunk");
+_Static_assert((int)ES_FILTER_COLUMNS % (int)ES_LIT_COLUMNS == 0, "blocks share no chunk");
 
 void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0, es_filter_scratch* s)
 {
