@@ -1,4 +1,4 @@
-/* The Cornell box that several scenes play in: 2 × 2 × 2 m, open towards the camera, walls 0.1 m thick; and a lamp that sways in front of it. */
+/* The Cornell box that several scenes play in: 2 × 2 × 2 m, open towards the camera, walls 0.1 m thick at the back; and a lamp that sways in front of it. */
 #ifndef EARTHSHINE_SIM_BOX_ROOM_H
 #define EARTHSHINE_SIM_BOX_ROOM_H
 

@@ -210,4 +210,11 @@ void es_build_creature(es_scene_builder* builder, es_node root, es_material hide
     }
     build_skin(builder, root, nodes, hide, scale);
     build_walk(builder, nodes, period);
+    for (uint32_t leg = 0; leg < 4; leg++) {
+        const bone* shin = &bones[LOWER(leg)];
+        const float length = shin->head.y - shin->tail.y, r = 0.12f;
+        es_shape_desc foot = es_capsule_shape(r, 0.5f * length - r + 0.02f);
+        foot.position = es_v3(0, -0.5f * length, 0);
+        es_build_body(builder, nodes[LOWER(leg)], ES_BODY_KINEMATIC, &foot, NULL);
+    }
 }

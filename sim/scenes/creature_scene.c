@@ -28,7 +28,7 @@ static void add_lamps(es_scene_builder* builder)
         es_node node = es_build_node(builder, "lamp", place, es_look_rotation(es_v3_sub(es_v3(0, 0.7f, 0), place)));
         es_light_desc lamp = es_default_light_desc();
         arc_color(share, lamp.color);
-        lamp.intensity = 40.0f / LAMPS;
+        lamp.intensity = 64.0f / LAMPS;
         lamp.outer_cone = 1.25f;
         es_build_light(builder, "lamp", node, &lamp);
     }
@@ -41,7 +41,7 @@ static void add_lamps(es_scene_builder* builder)
         glow.double_sided = true;
         for (int c = 0; c < 3; c++) {
             glow.base_color[c] = 0;
-            glow.emission[c] = 3 * color[c];
+            glow.emission[c] = 2 * color[c];
         }
         es_shape strip = es_build_shape(builder);
         for (int k = 0; k < 6; k++) {
@@ -78,7 +78,7 @@ es_result es_scene_creature(es_world* world, uint32_t triangles)
     walk.phase = 0.06f;
     es_build_mover(&builder, &walk);
     es_shape_desc bulk = es_capsule_shape(0.42f, 0.55f);
-    bulk.position = es_v3(0, 0.62f, -0.2f);
+    bulk.position = es_v3(0, 0.7f, -0.2f);
     bulk.rotation = es_quat_from_axis_angle(es_v3(1, 0, 0), 0.5f * ES_PI);
     es_build_body(&builder, root, ES_BODY_KINEMATIC, &bulk, NULL);
 
