@@ -153,8 +153,27 @@ static void leave_commands(player* p, es_window_input* input)
     }
 }
 
+/* Keys and clicks that wait behind the first since the last frame, each with an interface of its own, which is drawn but not shown: a frame
+ * that takes long loses none of them. */
+static void take_waiting(player* p)
+{
+    while (p->input.more && p->canvas.pixels && !p->quit && !p->wanted_scene[0]) {
+        es_window_input input = ui_game_input(&p->ui);
+        player_take_keys(p, &input);
+        leave_commands(p, &input);
+        const bool clicked = input.mouse_pressed[0] || input.mouse_pressed[2] || input.mouse_released[0];
+        if (clicked && !player_split_drag(p, &input) && !p->replaying) player_hand_update(p, &input);
+        ui_draw_on(&p->ui, &p->canvas);
+        player_build_panels(p);
+        ui_end(&p->ui);
+        es_window_poll(p->window, &p->input);
+        ui_begin(&p->ui, &p->input);
+    }
+}
+
 static int play_frame(player* p, float elapsed)
 {
+    take_waiting(p);
     es_window_input input = ui_game_input(&p->ui);
     player_take_keys(p, &input);
     leave_commands(p, &input);

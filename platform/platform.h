@@ -202,6 +202,8 @@ enum {
 };
 enum { ES_WINDOW_KEYS = 512, ES_WINDOW_TEXT = 32 };
 
+/* A poll goes no further than one key press (or repeat) or button press, so that none is lost and each is seen with what was held then;
+ * `more` says that others wait. A program that is slower than the keyboard polls on until there are none. */
 typedef struct es_window_input {
     bool down[ES_WINDOW_KEYS];       /* held now */
     bool pressed[ES_WINDOW_KEYS];    /* went down since the last poll */
@@ -213,6 +215,7 @@ typedef struct es_window_input {
     float scroll;
     bool mouse_down[3], mouse_pressed[3], mouse_released[3];  /* left, right, middle */
     float press_x[3], press_y[3];    /* where the pointer was when the button went down: the poll may come late */
+    bool more;                       /* further events wait for the next poll */
     bool close;                      /* the user asked to close the window */
     uint32_t width, height;          /* of the drawable */
 } es_window_input;

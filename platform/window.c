@@ -45,6 +45,15 @@ enum {
     GL_BGRA_ = 0x80e1, GL_UNSIGNED_INT_8_8_8_8_REV_ = 0x8367, GL_TRIANGLE_FAN_ = 6
 };
 
+typedef enum event_kind { EVENT_KEY, EVENT_CHARACTER, EVENT_BUTTON } event_kind;
+typedef struct window_event {
+    event_kind kind;
+    int what;                 /* key, character, button */
+    int action, modifiers;
+    float x, y;               /* the pointer, when a button changed */
+} window_event;
+enum { EVENTS = 512 };        /* a minute of a key held down; what comes beyond is lost */
+
 struct es_window {
     es_context* context;
     GLFWwindow* glfw;
@@ -52,6 +61,8 @@ struct es_window {
     const char* backend;
     es_window_input input;
     float cursor_x, cursor_y; /* as of the last event taken */
+    window_event events[EVENTS]; /* a ring of what polls have not told yet */
+    uint32_t first_event, event_count;
     /* X11 */
     Display* display;
     Window window;
@@ -98,25 +109,18 @@ static int key_of(int key)
     }
 }
 
-static void on_key(GLFWwindow* glfw, int key, int scan_code, int action, int modifiers)
+static void keep_event(es_window* window, window_event event)
 {
-    es_window* window = glfwGetWindowUserPointer(glfw);
-    int index = key_of(key);
-    if (index < 0) return;
-    /* a poll may come after the modifier was let go again: what a key was pressed with counts as pressed with it */
-    if (action == GLFW_PRESS && (modifiers & GLFW_MOD_CONTROL)) window->input.pressed[ES_KEY_CONTROL] = true;
-    if (action == GLFW_PRESS && (modifiers & GLFW_MOD_SHIFT)) window->input.pressed[ES_KEY_SHIFT] = true;
-    if (action != GLFW_RELEASE) window->input.repeated[index] = true;
-    if (action == GLFW_REPEAT) return;
-    window->input.down[index] = action == GLFW_PRESS;
-    if (action == GLFW_PRESS) window->input.pressed[index] = true;
+    if (window->event_count < EVENTS) window->events[(window->first_event + window->event_count++) % EVENTS] = event;
 }
 
-static void on_character(GLFWwindow* glfw, unsigned character)
+static void on_key(GLFWwindow* glfw, int key, int scan_code, int action, int modifiers)
 {
-    es_window* window = glfwGetWindowUserPointer(glfw);
-    if (window->input.text_count < ES_WINDOW_TEXT) window->input.text[window->input.text_count++] = character;
+    const int index = key_of(key);
+    if (index >= 0) keep_event(glfwGetWindowUserPointer(glfw), (window_event){EVENT_KEY, index, action, modifiers, 0, 0});
 }
+
+static void on_character(GLFWwindow* glfw, unsigned character) { keep_event(glfwGetWindowUserPointer(glfw), (window_event){EVENT_CHARACTER, (int)character, 0, 0, 0, 0}); }
 
 /* On screens with a scale (Wayland) the pointer is told in larger units than the drawable's pixels. */
 static void to_pixels(const es_window* window, double* x, double* y)
@@ -143,14 +147,56 @@ static void on_button(GLFWwindow* glfw, int button, int action, int modifiers)
 {
     es_window* window = glfwGetWindowUserPointer(glfw);
     if (button < 0 || button > 2) return;  /* GLFW counts left, right, middle too */
-    window->input.mouse_down[button] = action == GLFW_PRESS;
-    if (action == GLFW_PRESS) {
-        window->input.mouse_pressed[button] = true;
-        window->input.press_x[button] = window->cursor_x;
-        window->input.press_y[button] = window->cursor_y;
-    } else {
-        window->input.mouse_released[button] = true;
+    keep_event(window, (window_event){EVENT_BUTTON, button, action, modifiers, window->cursor_x, window->cursor_y});
+}
+
+/* Is it a press that has a poll to itself? */
+static bool is_press(const window_event* event)
+{
+    if (event->kind == EVENT_KEY) return event->action != GLFW_RELEASE && event->what != ES_KEY_SHIFT && event->what != ES_KEY_CONTROL && event->what != ES_KEY_ALT;
+    return event->kind == EVENT_BUTTON && event->action == GLFW_PRESS;
+}
+
+static void tell_event(es_window_input* input, const window_event* event)
+{
+    const int what = event->what;
+    switch (event->kind) {
+    case EVENT_KEY:
+        /* a poll may come after the modifier was let go again: what a key was pressed with counts as pressed with it */
+        if (event->action == GLFW_PRESS && (event->modifiers & GLFW_MOD_CONTROL)) input->pressed[ES_KEY_CONTROL] = true;
+        if (event->action == GLFW_PRESS && (event->modifiers & GLFW_MOD_SHIFT)) input->pressed[ES_KEY_SHIFT] = true;
+        if (event->action != GLFW_RELEASE) input->repeated[what] = true;
+        if (event->action == GLFW_REPEAT) break;
+        input->down[what] = event->action == GLFW_PRESS;
+        if (event->action == GLFW_PRESS) input->pressed[what] = true;
+        break;
+    case EVENT_CHARACTER:
+        if (input->text_count < ES_WINDOW_TEXT) input->text[input->text_count++] = (uint32_t)what;
+        break;
+    case EVENT_BUTTON:
+        input->mouse_down[what] = event->action == GLFW_PRESS;
+        if (event->action == GLFW_PRESS) {
+            input->mouse_pressed[what] = true;
+            input->press_x[what] = event->x;
+            input->press_y[what] = event->y;
+        } else {
+            input->mouse_released[what] = true;
+        }
+        break;
     }
+}
+
+static void tell_events(es_window* window)
+{
+    for (bool pressed = false; window->event_count;) {
+        const window_event* event = &window->events[window->first_event];
+        if (is_press(event) && pressed) break;
+        pressed |= is_press(event);
+        tell_event(&window->input, event);
+        window->first_event = (window->first_event + 1) % EVENTS;
+        window->event_count--;
+    }
+    window->input.more = window->event_count > 0;
 }
 
 static void on_scroll(GLFWwindow* glfw, double x, double y)
@@ -173,6 +219,7 @@ void es_window_poll(es_window* window, es_window_input* input)
     state->text_count = 0;
     state->scroll = 0;
     glfwPollEvents();
+    tell_events(window);
     double x, y;
     int width, height;
     glfwGetCursorPos(window->glfw, &x, &y);
