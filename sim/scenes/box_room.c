@@ -6,10 +6,10 @@
 /* One of the four walls about the opening, which is turned towards +z: its inner face is the quadrilateral of `edge` (two corners at the opening)
  * and the same moved back by 2 m. It is 0.1 m thick at the back and has an edge at the opening, so that its end is no bright frame round the
  * picture; walls meet in edges and mitres, so that none reaches into another, where pixels of both could be seen. The inner face is
- * three quadrilaterals: with them the wall has a box's 12 triangles. */
+ * two quadrilaterals: with them the wall has a box's 12 triangles. */
 static void add_wall(es_scene_builder* builder, const char* name, es_vec3 a, es_vec3 b, es_vec3 outwards, es_material material, es_vec3 low, es_vec3 high)
 {
-    enum { STRIPS = 3 };
+    enum { STRIPS = 2 };
     const float t = 0.1f;
     const es_vec3 back = {0, 0, -2}, along = es_v3_normalize(es_v3_sub(b, a), es_v3(1, 0, 0)), inwards = es_v3_scale(outwards, -1);
     /* the back's outer corners, where the neighbours' and the back wall's are too */
@@ -20,12 +20,12 @@ static void add_wall(es_scene_builder* builder, const char* name, es_vec3 a, es_
     for (int i = 0; i < STRIPS; i++) {
         const es_vec3 from = es_v3_scale(back, (float)i / STRIPS), to = es_v3_scale(back, (float)(i + 1) / STRIPS);
         es_shape_quad(&shape, es_v3_add(a, from), es_v3_add(b, from), es_v3_add(b, to), es_v3_add(a, to), inwards);
+        es_shape_facet(&shape, es_v3_add(a, from), es_v3_add(a, to), c, es_v3_scale(along, -1));
+        es_shape_facet(&shape, es_v3_add(b, from), es_v3_add(b, to), d, along);
     }
     const es_vec3 outer = es_v3_normalize(es_v3_cross(es_v3_sub(b, a), es_v3_sub(c, a)), outwards), mitre = es_v3_normalize(es_v3_cross(es_v3_sub(q, p), es_v3_sub(c, p)), es_v3(0, 0, -1));
     es_shape_quad(&shape, a, b, d, c, es_v3_dot(outer, outwards) > 0 ? outer : es_v3_scale(outer, -1));
     es_shape_quad(&shape, p, q, d, c, mitre.z < 0 ? mitre : es_v3_scale(mitre, -1));
-    es_shape_facet(&shape, a, p, c, es_v3_scale(along, -1));
-    es_shape_facet(&shape, b, q, d, along);
     es_node node = es_build_object(builder, name, &shape, material, es_v3(0, 0, 0));
     es_shape_desc body = es_box_shape(es_v3_scale(es_v3_sub(high, low), 0.5f));
     body.position = es_v3_scale(es_v3_add(low, high), 0.5f);
