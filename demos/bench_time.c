@@ -8,6 +8,7 @@
 
 static const bench_row table[] = {
     {"flicker", "change of the indirect light of points from frame to frame against a reference's, 256 lights, 120 frames: with history and steady lights", "relRMSE", "with neither", BENCH_RATIO_AT_LEAST, 5, 15},
+    {"flicker-matte", "the same of points without a lobe: what a polished ball reflects does not turn with the points that show it", "relRMSE", "with neither", BENCH_RATIO_AT_LEAST, 5, 15},
     {"flicker-change", "what the reference itself changes from frame to frame", "relRMSE", NULL, BENCH_NONE, 0, 0},
     {"flicker-pixels", "the same of pixels, whatever they show", "relRMSE", "with neither", BENCH_NONE, 0, 0},
     {"lag-brighter", "frames until indirect light is within 10 % after the lamp's light is multiplied by 10", "frames", NULL, BENCH_VALUE_AT_MOST, 8, 3},
@@ -71,13 +72,16 @@ static bool draw(bench_time_stage* s, es_renderer* renderer, es_image* image)
  *     flicker = sqrt(mean(((A(t) - A(t-1)) - (B(t) - B(t-1)))²)) / mean(B),   change = sqrt(mean((B(t) - B(t-1))²)) / mean(B). */
 
 enum { WITH, WITHOUT, REFERENCE, PICTURES };
-typedef enum bench_guide { MOTION, INSTANCE, NORMAL, GUIDES } bench_guide;
-static const char* const guide_names[GUIDES] = {"motion", "instance", "normal"};
+typedef enum bench_guide { MOTION, INSTANCE, NORMAL, SPECULAR, GUIDES } bench_guide;
+static const char* const guide_names[GUIDES] = {"motion", "instance", "normal", "specular"};
+
+/* Sums over values of points that were followed: squared errors of the two pictures, squared changes of the reference, the reference. */
+typedef struct bench_sums { double error[2], change, reference; uint64_t values; } bench_sums;
 
 typedef struct bench_follower {
     es_image pictures[2][PICTURES], guides[2][GUIDES]; /* [0] last frame's */
-    double error[2], change, reference;
-    uint64_t followed, seen, frames;
+    bench_sums all, matte;     /* of every point, and of those without a lobe */
+    uint64_t followed, seen;
 } bench_follower;
 
 static const float* pixel_of(const es_image* image, uint32_t x, uint32_t y) { return image->pixels + ((size_t)y * image->width + x) * image->channels; }
@@ -102,6 +106,22 @@ static int taps_of(const bench_follower* f, uint32_t x, uint32_t y, uint32_t tap
     return count;
 }
 
+static void add_changes(bench_sums* sums, const double change[PICTURES], double reference)
+{
+    for (int p = 0; p < REFERENCE; p++) sums->error[p] += (change[p] - change[REFERENCE]) * (change[p] - change[REFERENCE]);
+    sums->change += change[REFERENCE] * change[REFERENCE];
+    sums->reference += reference;
+    sums->values++;
+}
+
+static void set_ratio(bench_row* row, const bench_sums* sums)
+{
+    const double values = (double)sums->values, mean = sums->reference / values;
+    row->value = sqrt(sums->error[WITH] / values) / mean;
+    row->peer_value = sqrt(sums->error[WITHOUT] / values) / mean;
+    row->ratio = row->peer_value / row->value;
+}
+
 static void follow(bench_follower* f)
 {
     const es_image* any = &f->pictures[1][REFERENCE];
@@ -122,14 +142,13 @@ static void follow(bench_follower* f)
                     for (int i = 0; i < count; i++) then += weights[i] / total * (double)pixel_of(&f->pictures[0][p], taps[i][0], taps[i][1])[k];
                     change[p] = (double)pixel_of(&f->pictures[1][p], x, y)[k] - then;
                 }
-                for (int p = 0; p < REFERENCE; p++) f->error[p] += (change[p] - change[REFERENCE]) * (change[p] - change[REFERENCE]);
-                f->change += change[REFERENCE] * change[REFERENCE];
-                f->reference += (double)pixel_of(any, x, y)[k];
+                add_changes(&f->all, change, (double)pixel_of(any, x, y)[k]);
+                if (*pixel_of(&f->guides[1][SPECULAR], x, y) == 0.0f) add_changes(&f->matte, change, (double)pixel_of(any, x, y)[k]);
             }
         }
 }
 
-static bool measure_flicker(bench_time_stage* s, bench_row* flicker, bench_row* change, bench_row* pixels)
+static bool measure_flicker(bench_time_stage* s, bench_row* flicker, bench_row* matte, bench_row* change, bench_row* pixels)
 {
     const uint32_t frames = s->options->quick ? 12 : 120;
     es_renderer_settings settings[PICTURES] = {s->with, s->without, s->without};
@@ -143,7 +162,7 @@ static bool measure_flicker(bench_time_stage* s, bench_row* flicker, bench_row* 
     settings[REFERENCE].stable_vpls = true;
     es_renderer* renderers[PICTURES] = {NULL};
     es_flicker* flickers[2] = {NULL};
-    bench_follower f = {.frames = 0};
+    bench_follower f = {.seen = 0};
     bool works = true;
     for (int i = 0; i < PICTURES && works; i++) works = es_renderer_create(s->context, &settings[i], &renderers[i]) == ES_OK;
     for (int i = 0; i < 2 && works; i++) works = es_flicker_create(s->context, &flickers[i]) == ES_OK;
@@ -161,11 +180,9 @@ static bool measure_flicker(bench_time_stage* s, bench_row* flicker, bench_row* 
         memset(f.guides[1], 0, sizeof f.guides[1]);
     }
     if (works && f.followed) {
-        const double values = 3 * (double)f.followed, mean = f.reference / values;
-        flicker->value = sqrt(f.error[WITH] / values) / mean;
-        flicker->peer_value = sqrt(f.error[WITHOUT] / values) / mean;
-        flicker->ratio = flicker->peer_value / flicker->value;
-        change->value = sqrt(f.change / values) / mean;
+        set_ratio(flicker, &f.all);
+        if (f.matte.values) set_ratio(matte, &f.matte);
+        change->value = sqrt(f.all.change / (double)f.all.values) / (f.all.reference / (double)f.all.values);
         pixels->value = es_flicker_result(flickers[WITH]).flicker;
         pixels->peer_value = es_flicker_result(flickers[WITHOUT]).flicker;
         pixels->ratio = pixels->peer_value / pixels->value;
@@ -285,8 +302,8 @@ int bench_time(const bench_options* options)
     bench_report report = {.name = "time", .title = "Light over frames", .about = "Flicker, lag and cost of history."};
     bench_time_stage stage;
     bool works = open_stage(&stage, options, scene);
-    if (works && (bench_wants(options, "flicker") || bench_wants(options, "flicker-change") || bench_wants(options, "flicker-pixels")))
-        works = measure_flicker(&stage, bench_find_row(all, ROWS, "flicker"), bench_find_row(all, ROWS, "flicker-change"), bench_find_row(all, ROWS, "flicker-pixels"));
+    if (works && (bench_wants(options, "flicker") || bench_wants(options, "flicker-matte") || bench_wants(options, "flicker-change") || bench_wants(options, "flicker-pixels")))
+        works = measure_flicker(&stage, bench_find_row(all, ROWS, "flicker"), bench_find_row(all, ROWS, "flicker-matte"), bench_find_row(all, ROWS, "flicker-change"), bench_find_row(all, ROWS, "flicker-pixels"));
     static const struct { const char* id; float factor, shift; } changes[] = {{"lag-brighter", 10, 0}, {"lag-darker", 0.1f, 0}, {"lag-jump", 1, 0.1f}};
     for (size_t i = 0; i < sizeof changes / sizeof *changes && works; i++)
         if (bench_wants(options, changes[i].id)) works = measure_lag(&stage, changes[i].factor, changes[i].shift, bench_find_row(all, ROWS, changes[i].id));

@@ -66,8 +66,8 @@ static const es_setting renderer_table[] = {
     {"temporal.depth-threshold", ES_SETTING_FLOAT, "0.03", 0, 1, NULL, "another surface: largest relative difference of depth", AT(temporal_depth_threshold)},
     {"temporal.normal-threshold", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "another surface: smallest dot product of normals", AT(temporal_normal_threshold)},
     {"temporal.clamp", ES_SETTING_FLOAT, "0", 0, 10, NULL, "last frame's light is kept within its new neighbourhood's, widened by this share; 0: not", AT(temporal_clamp)},
-    {"temporal.reset-low", ES_SETTING_FLOAT, "0.2", 0, 10, NULL, "share by which a tile's light differs from its history's where the confidence begins to fall", AT(temporal_reset_low)},
-    {"temporal.reset-high", ES_SETTING_FLOAT, "0.5", 0, 10, NULL, "share from which on history is not used; 0: tiles are not compared", AT(temporal_reset_high)},
+    {"temporal.reset-low", ES_SETTING_FLOAT, "0.4", 0, 10, NULL, "share by which a tile's light differs from its history's where the confidence begins to fall", AT(temporal_reset_low)},
+    {"temporal.reset-high", ES_SETTING_FLOAT, "1", 0, 10, NULL, "share from which on history is not used; 0: tiles are not compared", AT(temporal_reset_high)},
     {"temporal.settle", ES_SETTING_INT, "64", 1, 100000, NULL, "frames without a change after which a picture is settled and nothing is left to do", AT(temporal_settle)},
 
     {"antialias", ES_SETTING_CHOICE, "none", 0, 0, "none|temporal|supersample", "smooth edges: over frames by motion, or by several pictures each frame", AT(antialias)},

@@ -19,8 +19,8 @@
  * adaptive temporal filtering are (Schied, Peters and Dachsbacher 2018), here with the blended history, so that slow drift is noticed
  * too. reset rises from 0 to 1 as the difference goes from reset_low to reset_high of the larger sum; the largest of a tile's and
  * its neighbours' counts, and pixels interpolate between tiles. Virtual point lights that come and go change a tile's light as well, so both
- * thresholds are wide; but how much the lights themselves changed is known, and where it was suddenly they go down to a tenth and a fifth
- * of that for this frame, and come back over the next.
+ * thresholds are wide; but how much the lights themselves changed is known, and where it was suddenly they go down to a twentieth and a
+ * tenth of that for this frame, and come back over the next.
  */
 #ifndef EARTHSHINE_GI_TEMPORAL_H
 #define EARTHSHINE_GI_TEMPORAL_H
