@@ -58,6 +58,9 @@ es_result es_scene_creature(es_world* world, uint32_t triangles)
     es_scene_builder builder = {world, ES_OK};
     es_material floor = es_build_lambert(&builder, "floor", 0.58f, 0.56f, 0.53f), wall = es_build_lambert(&builder, "wall", 0.66f, 0.64f, 0.60f);
     es_build_static_box(&builder, "floor", es_v3(-5, -0.2f, -5), es_v3(5, 0, 5), floor);
+    es_build_hidden_wall(&builder, es_v3(-5, -2, -5), es_v3(5, -0.1f, 5)); /* a foot that steps on a ball presses it no deeper than out again */
+    es_build_hidden_wall(&builder, es_v3(4.4f, 0, -5), es_v3(5, 4, 5));
+    es_build_hidden_wall(&builder, es_v3(-5, 0, 3.6f), es_v3(5, 4, 5)); /* before the camera, so that what is kicked stays in the picture */
     es_build_static_box(&builder, "back wall", es_v3(-5, 0, -4.3f), es_v3(5, 4, -4.1f), wall);
     es_build_static_box(&builder, "left wall", es_v3(-4.2f, 0, -4.1f), es_v3(-4.0f, 4, 5), wall);
 
