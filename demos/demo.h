@@ -29,7 +29,7 @@ typedef struct demo_options {
     const char* images[DEMO_MAX_IMAGES];
     size_t image_count;
     uint32_t width, height;
-    bool size_given, frames_given;
+    bool size_given, frames_given, fps_given;
     uint32_t first, end; /* frames [first, end) */
     double fps;
     uint32_t threads;  /* 0: all */

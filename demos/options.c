@@ -107,6 +107,7 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
         options->frames_given = true;
         return demo_parse_frames(value, &options->first, &options->end);
     case FPS:
+        options->fps_given = true;
         if (demo_parse_double(value, 0.1, 10000, &options->fps)) return DEMO_OK;
         return demo_refuse("--fps %s: a number from 0.1 to 10000 is expected", value);
     case THREADS:
@@ -201,6 +202,7 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
         }
         if (apply_option((enum option_id)id, value, options) != DEMO_OK) return DEMO_BAD_INPUT;
     }
+    if (options->fps_given && options->replay) return demo_refuse("%s: --fps and --replay exclude each other; a replay's steps last as long as the recorded ones", command);
     if (options->record && options->replay) return demo_refuse("%s: --record and --replay exclude each other", command);
     return DEMO_OK;
 }

@@ -165,7 +165,7 @@ static const command commands[] = {
     {'M', PLAIN, false, do_scenes, "M F2", "scenes"},
     {'O', PLAIN, false, do_settings, "O F3", "settings"},
     {'/', PLAIN, false, do_find, "/", "find a setting"},
-    {'T', PLAIN, false, do_graphs, "T F4", "graphs: time, flicker, energy"},
+    {'T', PLAIN, false, do_graphs, "T F4", "graphs: time, flicker, motion"},
     {'Y', PLAIN, false, do_timeline, "Y", "time line"},
     {'U', PLAIN, false, do_hide, "U", "hide everything, show it again"},
     {0, PLAIN, false, NULL, "Tab ↑ ↓ ← →", "between panels, within one"},

@@ -64,8 +64,14 @@ static float measure_flicker(player* p)
 
 /* ---- bodies --------------------------------------------------------------------------------------------------------------------------------- */
 
-/* Of the bodies' motion (but their spin) and height over the scene's floor, and of cloth's motion, joules: where nothing pushes it may not
- * rise. NaN without any. */
+/* Times gravity: J/kg. */
+static double height_over(const double p[3], es_vec3 low, es_vec3 g)
+{
+    return -(double)g.x * (p[0] - (double)low.x) - (double)g.y * (p[1] - (double)low.y) - (double)g.z * (p[2] - (double)low.z);
+}
+
+/* Mechanical energy: of the motion and the height over the scene's floor of bodies and cloth, joules. Where nothing pushes it may not rise; what
+ * springs and stretched cloth store is not in it. NaN without any. */
 static float measure_energy(const player* p)
 {
     enum { MOST = 4096 };
@@ -84,13 +90,14 @@ static float measure_energy(const player* p)
             es_body_state body;
             es_soft_state soft;
             if (kinds[k] == ES_OBJECT_SOFT) {
-                if (es_world_get_soft_state(world, (es_soft){ids[i]}, &soft) == ES_OK) sum += (double)soft.kinetic_energy, moving++;
+                es_soft_desc desc;
+                if (es_world_get_soft_state(world, (es_soft){ids[i]}, &soft) != ES_OK || es_world_get_soft(world, (es_soft){ids[i]}, &desc) != ES_OK) continue;
+                sum += (double)soft.kinetic_energy + (double)(desc.mass * desc.gravity_scale) * height_over(soft.centre, low, settings.gravity);
+                moving++;
                 continue;
             }
             if (es_world_get_body(world, (es_body){ids[i]}, &body) != ES_OK || body.type != ES_BODY_DYNAMIC) continue;
-            es_vec3 v = body.velocity, g = settings.gravity;
-            double height = -(double)g.x * (body.centre[0] - (double)low.x) - (double)g.y * (body.centre[1] - (double)low.y) - (double)g.z * (body.centre[2] - (double)low.z);
-            sum += (double)body.mass * (0.5 * (double)(v.x * v.x + v.y * v.y + v.z * v.z) + (double)body.gravity_scale * height);
+            sum += (double)body.kinetic_energy + (double)(body.mass * body.gravity_scale) * height_over(body.centre, low, settings.gravity);
             moving++;
         }
     }
@@ -184,7 +191,7 @@ void player_graphs_panel(player* p, canvas_rect rect)
     plot(p, height, title, "%.2f ms", &g->frame, UI_TEXT);
     plot(p, height, "flicker", "%.4f", &g->flicker, colours[3]);
     plot(p, height, "brightness", "%.3f", &g->brightness, colours[1]);
-    if (isfinite(ui_series_at(&g->energy, 0))) plot(p, height, "energy", "%.4g J", &g->energy, colours[2]);
+    if (isfinite(ui_series_at(&g->energy, 0))) plot(p, height, "mechanical energy", "%.4g J", &g->energy, colours[2]);
     plot_passes(p, 2 * height);
     ui_panel_end(u);
 }

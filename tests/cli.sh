@@ -122,6 +122,8 @@ says '^frame 4 display '
 refused '6 frames' render --replay stack.rec --frames 0:7 --hash
 refused 'is a recording of cornell-stack' render cornell --replay stack.rec
 refused 'exclude each other' render --replay stack.rec --record other.rec
+refused 'last as long as the recorded' render --replay stack.rec --fps 10 --hash
+refused 'last as long as the recorded' play --fps=10 --replay stack.rec
 refused 'nowhere' render cornell --record nowhere/at.rec
 refused 'missing.rec' render --replay missing.rec
 head -c 2000 stack.rec >damaged.rec
