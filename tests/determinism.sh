@@ -4,8 +4,10 @@
 #
 # usage: determinism.sh BUILD_DIR SOURCE_DIR           this build alone
 #        determinism.sh BUILD_DIR SOURCE_DIR matrix    builds by gcc -O1, clang -O1 and clang -O3 without the optional libraries,
-#                                                      on 1 and 3 threads, and one for aarch64 under qemu-user, in BUILD_DIR/determinism; the
-#                                                      release build itself is gcc -O3
+#                                                      on 3 threads, and one for aarch64 under qemu-user, in BUILD_DIR/determinism; the
+#                                                      release build itself is gcc -O3, and is compared on every number of threads. The
+#                                                      builds have the instruction sets that this processor runs, those by -O1 scalar code
+#                                                      and the best of them
 # Ends with "N compared, N different".
 set -u
 build=$1
@@ -99,19 +101,29 @@ else
         for level in -O1 -O3; do
             [ "$compiler $level" = "gcc -O3" ] && continue
             folder=$work/$compiler$level
-            if configure_and_build "$folder" -DCMAKE_C_COMPILER=$compiler -DEARTHSHINE_OPTIMIZE=$level; then
-                every_way "$compiler $level" "$folder/frame_hashes" 1 3
+            isas=$("$build/frame_hashes" --isas)
+            [ $level = -O1 ] && isas="scalar $(tail -n 1 <<<"$isas")"
+            if configure_and_build "$folder" -DCMAKE_C_COMPILER=$compiler -DEARTHSHINE_OPTIMIZE=$level "-DEARTHSHINE_ISAS=$(tr -s ' \n' ';' <<<"$isas" | sed 's/;$//')"; then
+                every_way "$compiler $level" "$folder/frame_hashes" 3
             fi
         done
     done
 
-    # An emulated processor is some thirty times slower: three scenes, and neither 2 nor 8 threads.
+    # An emulated processor is some thirty times slower: three scenes at most, each way once.
     if command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null; then
         folder=$work/aarch64
         if configure_and_build "$folder" -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
             -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc "-DCMAKE_CROSSCOMPILING_EMULATOR=qemu-aarch64;-L;/usr/aarch64-linux-gnu"; then
-            scenes="cornell parts cornell-stack"
-            every_way "aarch64" "qemu-aarch64 -L /usr/aarch64-linux-gnu $folder/frame_hashes" 1 3
+            program="qemu-aarch64 -L /usr/aarch64-linux-gnu $folder/frame_hashes"
+            # shellcheck disable=SC2086
+            for isa in $($program --isas); do
+                scenes="cornell parts cornell-stack" threads=3
+                [ "$isa" = scalar ] && scenes="parts cornell-stack" threads=1
+                compare "aarch64, $isa, $threads threads" $program --isa $isa --threads $threads $scenes
+            done
+            scenes="cornell cornell-stack"
+            # shellcheck disable=SC2086
+            compare "aarch64, --no-skip" $program --no-skip $scenes
         fi
     else
         echo "skipped: aarch64 needs aarch64-linux-gnu-gcc and qemu-aarch64"

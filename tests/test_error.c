@@ -11,6 +11,7 @@
 
 #include "gi/gi.h"
 #include "platform/random.h"
+#include "tests/races.h"
 
 static void ignore(void* user, es_log_level level, es_result item, const char* message)
 {
@@ -560,23 +561,23 @@ static void test_same_bits(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_by_hand, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_not_finite, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_sums_lose_nothing, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_properties, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_channels, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_maps, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_false_colour, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flip_independent, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_hdr_flip_independent, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flip_properties, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flip_has_no_seams, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_hdr_flip_follows_the_scale, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flip_of_extremes, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flip_refusals, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flicker_by_hand, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flicker_of_noise, setup, teardown),
-        cmocka_unit_test_setup_teardown(test_flicker_not_finite, setup, teardown),
+        unit_test_without_races_setup_teardown(test_by_hand, setup, teardown),
+        unit_test_without_races_setup_teardown(test_not_finite, setup, teardown),
+        unit_test_without_races_setup_teardown(test_sums_lose_nothing, setup, teardown),
+        unit_test_without_races_setup_teardown(test_properties, setup, teardown),
+        unit_test_without_races_setup_teardown(test_channels, setup, teardown),
+        unit_test_without_races_setup_teardown(test_maps, setup, teardown),
+        unit_test_without_races_setup_teardown(test_false_colour, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flip_independent, setup, teardown),
+        unit_test_without_races_setup_teardown(test_hdr_flip_independent, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flip_properties, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flip_has_no_seams, setup, teardown),
+        unit_test_without_races_setup_teardown(test_hdr_flip_follows_the_scale, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flip_of_extremes, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flip_refusals, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flicker_by_hand, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flicker_of_noise, setup, teardown),
+        unit_test_without_races_setup_teardown(test_flicker_not_finite, setup, teardown),
         cmocka_unit_test_setup_teardown(test_same_bits, setup, teardown),
     };
     return cmocka_run_group_tests_name("error", tests, NULL, NULL);

@@ -156,6 +156,7 @@ static void test_kept_maps_have_the_same_bits(void** state)
         run(&other, 3, false, stable, 64, false);
         compare(&kept, &other, "drawn from nothing");
         for (int frame = 0; frame < FRAMES; frame++) assert_int_equal(other.count[frame], VPLS * POINTS);
+#if !defined(__SANITIZE_THREAD__) /* the same passes again */
         run(&other, 1, true, stable, 64, false);
         compare(&kept, &other, "one thread");
         run(&other, 3, true, stable, 0, false);
@@ -164,6 +165,7 @@ static void test_kept_maps_have_the_same_bits(void** state)
             run(&other, 3, true, false, 64, true);
             compare(&kept, &other, "each frame alone");
         }
+#endif
         /* while the ball moves, its points and what sits on it are drawn; at rest, nothing is, though the light changes its colour */
         const uint64_t all = VPLS * POINTS;
         for (int frame = 4; frame < 10; frame++)

@@ -12,6 +12,7 @@
 
 #include "gi/reference/reference.h"
 #include "tests/reference_runs.h"
+#include "tests/races.h"
 
 enum { SIZE = 24, SPOT = 1, SOFT = 2, POINT = 4, FAR_POINT = 8, SUN = 16, RANGED = 32 };
 
@@ -210,8 +211,8 @@ static void test_same_bits(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_each_alone),
-        cmocka_unit_test(test_shared),
+        unit_test_without_races(test_each_alone),
+        unit_test_without_races(test_shared),
         cmocka_unit_test(test_same_bits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -19,6 +19,7 @@
 #include "platform/random.h"
 #include "raster/pack.h"
 #include "raster/raster.h"
+#include "tests/races.h"
 
 /* ---- helpers --------------------------------------------------------------------------------------------------------- */
 
@@ -590,18 +591,20 @@ static void check_view(bench* b, scene* sc, es_raster_view view)
 
 static void test_against_rays(void** state)
 {
-#if defined(__SANITIZE_THREAD__)
-    skip(); /* minutes of a brute-force ray caster on one thread */
-#endif
     bench* b = open_bench(2, 0);
+#if defined(__SANITIZE_ADDRESS__)
+    const uint32_t part = 2; /* every ray tries every triangle */
+#else
+    const uint32_t part = 1;
+#endif
     for (int trial = 0; trial < 3; trial++) {
         scene* s = new_scene();
         es_vec3 eye = {(float)uniform(-0.5, 0.5), (float)uniform(-0.5, 0.5), 0};
-        es_raster_view view = es_perspective_view(149, 101, eye, (es_vec3){0.1f, -0.05f, -1}, up, 1.1f, 0.1f);
+        es_raster_view view = es_perspective_view(149 / part, 101 / part, eye, (es_vec3){0.1f, -0.05f, -1}, up, 1.1f, 0.1f);
         view.cull = trial == 0 ? ES_CULL_NONE : ES_CULL_BACK;
         if (trial == 2) view.previous_view = es_mat4_look((es_vec3){eye.x + 0.1f, eye.y, 0.05f}, (es_vec3){0.15f, -0.05f, -1}, up);
         check_view(b, s, view);
-        es_raster_view flat = es_orthographic_view(120, 90, (es_vec3){0.1f, 0.2f, 0}, (es_vec3){0.1f, 0.02f, -1}, up, 3, 2.25f, 0.1f, 20);
+        es_raster_view flat = es_orthographic_view(120 / part, 90 / part, (es_vec3){0.1f, 0.2f, 0}, (es_vec3){0.1f, 0.02f, -1}, up, 3, 2.25f, 0.1f, 20);
         flat.cull = view.cull;
         check_view(b, s, flat);
         free_scene(s);
@@ -1264,25 +1267,25 @@ static void test_largest_view(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shared_edges),
-        cmocka_unit_test(test_fans),
-        cmocka_unit_test(test_small_grid),
-        cmocka_unit_test(test_inside_a_box),
-        cmocka_unit_test(test_closed_soup),
-        cmocka_unit_test(test_coverage_notices_a_tear),
-        cmocka_unit_test(test_against_rays),
-        cmocka_unit_test(test_perspective_correct),
-        cmocka_unit_test(test_inside_depth),
-        cmocka_unit_test(test_culling),
+        unit_test_without_races(test_shared_edges),
+        unit_test_without_races(test_fans),
+        unit_test_without_races(test_small_grid),
+        unit_test_without_races(test_inside_a_box),
+        unit_test_without_races(test_closed_soup),
+        unit_test_without_races(test_coverage_notices_a_tear),
+        unit_test_without_races(test_against_rays),
+        unit_test_without_races(test_perspective_correct),
+        unit_test_without_races(test_inside_depth),
+        unit_test_without_races(test_culling),
         cmocka_unit_test(test_bad_vertices),
-        cmocka_unit_test(test_bad_arguments),
+        unit_test_without_races(test_bad_arguments),
         cmocka_unit_test(test_memory_cap),
-        cmocka_unit_test(test_texture_images),
-        cmocka_unit_test(test_wrap_and_filter),
-        cmocka_unit_test(test_mip_selection),
-        cmocka_unit_test(test_alpha_mask),
-        cmocka_unit_test(test_normal_map),
-        cmocka_unit_test(test_material_textures),
+        unit_test_without_races(test_texture_images),
+        unit_test_without_races(test_wrap_and_filter),
+        unit_test_without_races(test_mip_selection),
+        unit_test_without_races(test_alpha_mask),
+        unit_test_without_races(test_normal_map),
+        unit_test_without_races(test_material_textures),
         cmocka_unit_test(test_equal_bits),
         cmocka_unit_test(test_largest_view),
     };

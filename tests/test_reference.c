@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "tests/reference_runs.h"
+#include "tests/races.h"
 
 enum { WIDTH = 12, HEIGHT = 9, VALUES = WIDTH * HEIGHT * 3 };
 
@@ -437,17 +438,17 @@ static void test_light_choice(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_images_add_up),
-        cmocka_unit_test(test_every_number_of_bounces),
-        cmocka_unit_test(test_error_is_of_the_samples),
-        cmocka_unit_test(test_error_is_honest),
-        cmocka_unit_test(test_stops_at_an_error),
-        cmocka_unit_test(test_stops_at_samples_and_seconds),
-        cmocka_unit_test(test_back_to_back),
-        cmocka_unit_test(test_open_mask_gives_no_light),
+        unit_test_without_races(test_images_add_up),
+        unit_test_without_races(test_every_number_of_bounces),
+        unit_test_without_races(test_error_is_of_the_samples),
+        unit_test_without_races(test_error_is_honest),
+        unit_test_without_races(test_stops_at_an_error),
+        unit_test_without_races(test_stops_at_samples_and_seconds),
+        unit_test_without_races(test_back_to_back),
+        unit_test_without_races(test_open_mask_gives_no_light),
         cmocka_unit_test(test_determinism),
         cmocka_unit_test(test_resuming),
-        cmocka_unit_test(test_light_choice),
+        unit_test_without_races(test_light_choice),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

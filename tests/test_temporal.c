@@ -12,6 +12,7 @@
 #include "gi/gi.h"
 #include "platform/context.h"
 #include "platform/maths.h"
+#include "tests/races.h"
 
 enum { WIDTH = 72, HEIGHT = 52 };
 
@@ -359,10 +360,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_settles),
-        cmocka_unit_test(test_ends),
-        cmocka_unit_test(test_moved_camera),
-        cmocka_unit_test(test_light_changes),
+        unit_test_without_races(test_settles),
+        unit_test_without_races(test_ends),
+        unit_test_without_races(test_moved_camera),
+        unit_test_without_races(test_light_changes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

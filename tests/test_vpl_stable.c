@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "tests/small_worlds.h"
+#include "tests/races.h"
 
 enum { VPLS = 128, FRAMES = 24, MOST_LIGHTS = 3 };
 
@@ -348,9 +349,9 @@ static void test_same_bits_and_rest(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_lights_follow_their_surfaces),
-        cmocka_unit_test(test_energy_is_that_of_new_sets),
-        cmocka_unit_test(test_no_camera_moves_lights),
+        unit_test_without_races(test_lights_follow_their_surfaces),
+        unit_test_without_races(test_energy_is_that_of_new_sets),
+        unit_test_without_races(test_no_camera_moves_lights),
         cmocka_unit_test(test_lights_come_and_go),
         cmocka_unit_test(test_a_lamp_jumps),
         cmocka_unit_test(test_same_bits_and_rest),

@@ -13,6 +13,7 @@
 #include "gi/renderer.h"
 #include "tests/small_worlds.h"
 #include "tests/statistics.h"
+#include "tests/races.h"
 
 enum { WIDTH = 24, HEIGHT = 18, PIXELS = WIDTH * HEIGHT };
 
@@ -548,18 +549,18 @@ static void test_memory_cap(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_all_pairs),
-        cmocka_unit_test(test_interleaved_pairs),
-        cmocka_unit_test(test_open_world),
-        cmocka_unit_test(test_visibility_alone),
-        cmocka_unit_test(test_pattern_of_one),
-        cmocka_unit_test(test_compensation_alone),
-        cmocka_unit_test(test_bounding_takes_away),
-        cmocka_unit_test(test_bias_of_diffuse_surfaces),
-        cmocka_unit_test(test_bias_of_lobes),
+        unit_test_without_races(test_all_pairs),
+        unit_test_without_races(test_interleaved_pairs),
+        unit_test_without_races(test_open_world),
+        unit_test_without_races(test_visibility_alone),
+        unit_test_without_races(test_pattern_of_one),
+        unit_test_without_races(test_compensation_alone),
+        unit_test_without_races(test_bounding_takes_away),
+        unit_test_without_races(test_bias_of_diffuse_surfaces),
+        unit_test_without_races(test_bias_of_lobes),
         cmocka_unit_test(test_determinism),
         cmocka_unit_test(test_skipping),
-        cmocka_unit_test(test_memory_cap),
+        unit_test_without_races(test_memory_cap),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

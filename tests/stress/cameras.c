@@ -155,7 +155,7 @@ static void near_planes(void** state)
     (void)state;
     static const float planes[] = {1e-6f, 1e-3f, 0.1f, 0.9f, 1.0f, 2.0f, 3.0f, 3.5f, 4.2f, 1e6f};
     float first[PIXELS];
-    for (size_t i = 0; i < sizeof planes / sizeof *planes; i++)
+    for (size_t i = 0; i < sizeof planes / sizeof *planes; i = stress_next(i, sizeof planes / sizeof *planes))
         for (uint32_t method = ES_GI_NONE; method <= ES_GI_VPL_TRACED; method++) {
             stress s = glowing_room();
             stress_look(&s, es_v3(0.1f, 1.4f, 1.5f), es_v3(0, 1, -1), 0.9f, planes[i]);
@@ -186,7 +186,7 @@ static void fields_of_view(void** state)
 {
     (void)state;
     static const float degrees[] = {1, 2, 5, 20, 60, 90, 120, 150, 165, 170};
-    for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++)
+    for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i = stress_next(i, sizeof degrees / sizeof *degrees))
         for (uint32_t method = ES_GI_NONE; method <= ES_GI_VPL_TRACED; method++) {
             char what[40];
             snprintf(what, sizeof what, "%g degrees high", (double)degrees[i]);

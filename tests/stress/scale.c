@@ -99,7 +99,7 @@ static void scales_by_powers_of_two(void** state)
     for (uint32_t method = ES_GI_ISM; method < METHODS; method++) {
         picture one = picture_of(1, es_v3(0, 0, 0), method);
         const int exponents[] = {-14, -7, -1, 3, 14};
-        for (int i = 0; i < 5; i++) {
+        for (size_t i = 0; i < 5; i = stress_next(i, 5)) {
             char what[40];
             snprintf(what, sizeof what, "method %u, scale 2^%d", method, exponents[i]);
             float scale = ldexpf(1, exponents[i]);
@@ -117,7 +117,7 @@ static void scales(void** state)
     for (uint32_t method = ES_GI_ISM; method < METHODS; method++) {
         picture one = picture_of(1, es_v3(0, 0, 0), method);
         const float scale[] = {1e-4f, 1e-3f, 0.1f, 10, 1e3f, 1e4f};
-        for (int i = 0; i < 6; i++) {
+        for (size_t i = 0; i < 6; i = stress_next(i, 6)) {
             char what[40];
             snprintf(what, sizeof what, "method %u, scale %g", method, (double)scale[i]);
             picture other = picture_of(scale[i], es_v3(0, 0, 0), method);
@@ -133,10 +133,10 @@ static void moving_frames(void** state)
 {
     (void)state;
     const struct { float scale; es_vec3 to; bool exact; } cases[] = {{0x1p-14f, {0, 0, 0}, true}, {0x1p14f, {0, 0, 0}, true}, {1, {131072, -65536, 98304}, true}, {1e-4f, {0, 0, 0}, false}, {1e4f, {0, 0, 0}, false},
-        {1, {1e5f, 1e5f, 1e5f}, false}, {1, {-12345.67f, 3210.9f, 777.7f}, false}};
+        {1, {-12345.67f, 3210.9f, 777.7f}, false}, {1, {1e5f, 1e5f, 1e5f}, false}};
     for (uint32_t method = ES_GI_ISM; method < METHODS; method++) {
         picture one = frame_of(1, es_v3(0, 0, 0), method, true);
-        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; i = stress_next(i, sizeof cases / sizeof *cases)) {
             char what[80];
             snprintf(what, sizeof what, "method %u, moving, scale %g, at %g", method, (double)cases[i].scale, (double)cases[i].to.x);
             picture other = frame_of(cases[i].scale, cases[i].to, method, true);
@@ -175,7 +175,7 @@ static void moves(void** state)
     for (uint32_t method = ES_GI_ISM; method < METHODS; method++) {
         picture one = picture_of(1, es_v3(0, 0, 0), method);
         const es_vec3 to[] = {{1.7f, -0.3f, 0.9f}, {100.1f, 50.7f, -33.3f}, {-12345.67f, 3210.9f, 777.7f}, {1e5f, 1e5f, 1e5f}, {-1e5f, 7.7f, 99999.9f}};
-        for (int i = 0; i < 5; i++) {
+        for (size_t i = 0; i < 5; i = stress_next(i, 5)) {
             char what[60];
             snprintf(what, sizeof what, "method %u, moved to %g %g %g", method, (double)to[i].x, (double)to[i].y, (double)to[i].z);
             picture other = picture_of(1, to[i], method);

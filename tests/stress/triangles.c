@@ -1,6 +1,7 @@
 /* Triangles no one would model: slivers, needles, without area, in one place twice, as big as the world, smaller than a pixel. Seen by the
  * rasterizer, by rays, by points and by virtual lights they are what their plane is, and where two lie in one place, the first one wins. */
 #include "tests/stress/stress.h"
+#include "tests/races.h"
 #include "gi/reference/bvh.h"
 #include "sim/world.h"
 
@@ -197,9 +198,6 @@ static void free_picture(picture* p)
  * go elsewhere, which leaves a spot where their pixel is close to what they hit. */
 static void cuts_of_a_plane(void** state)
 {
-#if defined(__SANITIZE_THREAD__)
-    skip(); /* every method many times over, whose threads do what those of the other tests do */
-#endif
     (void)state;
     for (size_t method = 0; method <= REFERENCE; method++) {
         picture whole = picture_of(WHOLE, method);
@@ -289,12 +287,9 @@ static stress doubled(int copies, bool red_first, float turn)
  * imperfect maps are drawn from fewer of each; their picture is the same but for these. */
 static void duplicated(void** state)
 {
-#if defined(__SANITIZE_THREAD__)
-    skip(); /* every method many times over, whose threads do what those of the other tests do */
-#endif
     (void)state;
     for (size_t method = 0; method <= REFERENCE; method++)
-        for (int view = 0; view < 4; view++) {
+        for (size_t view = 0; view < 4; view = stress_next(view, 4)) {
             const float turn = 0.37f * (float)view;
             es_image image[3];
             uint64_t hash[3];
@@ -316,7 +311,7 @@ static void duplicated(void** state)
                 }
                 hash[i] = es_image_hash(&image[i]);
             }
-            if (hash[0] != hash[1]) fail_msg("%s, view %d: copies in the same place change the picture, relRMSE %g", method == REFERENCE ? "reference" : methods[method].name, view, difference_of(&image[1], &image[0], 1).relrmse);
+            if (hash[0] != hash[1]) fail_msg("%s, view %d: copies in the same place change the picture, relRMSE %g", method == REFERENCE ? "reference" : methods[method].name, (int)view, difference_of(&image[1], &image[0], 1).relrmse);
             assert_true(hash[0] != hash[2]);
             for (int i = 0; i < 3; i++) {
                 es_image_destroy(s[i].context, &image[i]);
@@ -411,9 +406,9 @@ static void one_covers_the_picture(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cuts_of_a_plane),
-        cmocka_unit_test(rays_fall_through_no_cut),
-        cmocka_unit_test(duplicated),
+        unit_test_without_races(cuts_of_a_plane),
+        unit_test_without_races(rays_fall_through_no_cut),
+        unit_test_without_races(duplicated),
         cmocka_unit_test(coplanar),
         cmocka_unit_test(one_covers_the_picture),
     };
