@@ -36,9 +36,14 @@ void es_log(es_context* context, es_log_level level, es_result item, const char*
 /* body(user, begin, end, worker): called for the chunks [k * grain, min((k + 1) * grain, count)), each exactly once, on some
  * worker in [0, es_context_workers). Chunk borders depend on count and grain alone, so a body whose chunks write apart
  * gives the same bits for any number of threads. The floating-point environment is set for each worker and restored.
+ * Chunks are handed out in their order: when one begins, each before it has begun, on this worker (and ended) or on one that is running.
+ * So a chunk may wait for those before it, with es_wait_a_little, and for no others; on however few threads, one always gets on.
  * Does not nest: a body may not start another loop. */
 typedef void (*es_loop_body)(void* user, uint32_t begin, uint32_t end, uint32_t worker);
 void es_parallel_for(es_context* context, uint32_t count, uint32_t grain, es_loop_body body, void* user);
+/* One turn of waiting for another worker; *turns, 0 before the first, counts them. A processor that others need is given away after
+ * about 20 microseconds. */
+void es_wait_a_little(uint32_t* turns);
 uint32_t es_context_workers(const es_context* context);
 
 /* Round to nearest, no flush to zero, no traps: on entry to every public call that computes; the caller's is put back. A build with

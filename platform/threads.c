@@ -176,6 +176,12 @@ static void run_chunks(void* data, uint32_t worker)
     es_fp_leave(environment);
 }
 
+void es_wait_a_little(uint32_t* turns)
+{
+    if (++*turns % 1024 == 0) sched_yield();
+    else relax();
+}
+
 void es_parallel_for(es_context* context, uint32_t count, uint32_t grain, es_loop_body body, void* user)
 {
     if (count == 0) return;

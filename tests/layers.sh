@@ -7,6 +7,10 @@
 set -u
 build=$1
 source=$2
+if [ ! -d "$build" ] || [ ! -d "$source" ] || [ "$build" -ef "$source" ]; then
+    echo "layers.sh: '$build', '$source': a build directory and another one, of the sources, are needed" >&2
+    exit 2
+fi
 cd "$source" || exit 1
 status=0
 fail()

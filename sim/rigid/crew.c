@@ -1,7 +1,6 @@
 /* See crew.h. */
 #include "sim/rigid/crew.h"
 
-#include <sched.h>
 #include <stdatomic.h>
 
 typedef struct crew {
@@ -24,17 +23,6 @@ static void run_block(const crew* c, const es_stage* stage, uint32_t block)
     c->body(c->user, stage->kind, begin, left > stage->grain ? begin + stage->grain : stage->end);
 }
 
-/* A processor that others need is given away after about 20 microseconds. */
-static void wait_a_little(uint32_t* turns)
-{
-    if (++*turns % 1024 == 0) sched_yield();
-#if defined(__x86_64__)
-    else __builtin_ia32_pause();
-#elif defined(__aarch64__)
-    else __asm__ volatile("yield");
-#endif
-}
-
 static void lead(crew* c)
 {
     for (uint32_t s = 0; s < c->count; s++) {
@@ -52,7 +40,7 @@ static void lead(crew* c)
             run_block(c, stage, block);
             atomic_fetch_add_explicit(&c->done, 1, memory_order_release);
         }
-        while (atomic_load_explicit(&c->done, memory_order_acquire) != blocks) wait_a_little(&turns);
+        while (atomic_load_explicit(&c->done, memory_order_acquire) != blocks) es_wait_a_little(&turns);
     }
     atomic_store_explicit(&c->over, true, memory_order_release);
 }
@@ -64,7 +52,7 @@ static void follow(crew* c)
         uint64_t seen = atomic_load_explicit(&c->claim, memory_order_acquire);
         const es_stage* stage = &c->stages[seen >> 32];
         if ((uint32_t)seen >= blocks_of(stage)) {
-            wait_a_little(&turns);
+            es_wait_a_little(&turns);
             continue;
         }
         uint64_t claim = atomic_fetch_add_explicit(&c->claim, 1, memory_order_acq_rel);

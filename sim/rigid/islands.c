@@ -98,7 +98,15 @@ static void join(uint32_t* parents, uint32_t a, uint32_t b)
     else parents[a] = b;
 }
 
-bool es_islands_sleep(es_world* world, float h)
+bool es_islands_reserve(es_world* world)
+{
+    es_rigid* rigid = world->rigid;
+    const uint32_t count = rigid->dynamic_count;
+    return es_grow(world->context, (void**)&rigid->parents, &rigid->parent_capacity, 0, count, sizeof *rigid->parents) &&
+           es_grow(world->context, (void**)&rigid->stillness, &rigid->stillness_capacity, 0, count, sizeof *rigid->stillness);
+}
+
+void es_islands_sleep(es_world* world, float h)
 {
     es_rigid* rigid = world->rigid;
     const es_slots* slots = &world->slots[ES_OBJECT_BODY];
@@ -109,10 +117,8 @@ bool es_islands_sleep(es_world* world, float h)
         body->still = speed < ES_SLEEP_SPEED && !body->no_sleep ? body->still + h : 0.0f;
         any |= body->still >= ES_SLEEP_SECONDS;
     }
-    if (!any || !world->settings.sleep) return true;
-    uint32_t count = rigid->dynamic_count;
-    if (!es_grow(world->context, (void**)&rigid->parents, &rigid->parent_capacity, 0, count, sizeof *rigid->parents)) return false;
-    if (!es_grow(world->context, (void**)&rigid->stillness, &rigid->stillness_capacity, 0, count, sizeof *rigid->stillness)) return false;
+    if (!any || !world->settings.sleep) return;
+    const uint32_t count = rigid->dynamic_count;
     uint32_t* parents = rigid->parents;
     float* stillness = rigid->stillness;
     for (uint32_t i = 0; i < count; i++) parents[i] = i;
@@ -138,5 +144,4 @@ bool es_islands_sleep(es_world* world, float h)
         body->velocity = body->angular_velocity = es_v3(0, 0, 0);
         rigid->unsorted = true;
     }
-    return true;
 }

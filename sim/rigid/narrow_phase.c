@@ -87,11 +87,16 @@ static es_contact_event event_of(const es_world* world, const es_contact* contac
     };
 }
 
+bool es_events_reserve(es_world* world, size_t more)
+{
+    es_rigid* rigid = world->rigid;
+    return es_grow(world->context, (void**)&rigid->events, &rigid->event_capacity, rigid->event_count, rigid->event_count + more, sizeof *rigid->events);
+}
+
 void es_report_leaving(es_world* world, const es_contact* contact)
 {
     es_rigid* rigid = world->rigid;
-    if (!es_grow(world->context, (void**)&rigid->events, &rigid->event_capacity, rigid->event_count, rigid->event_count + 1, sizeof *rigid->events)) return;
-    rigid->events[rigid->event_count++] = event_of(world, contact, false);
+    if (rigid->event_count < rigid->event_capacity) rigid->events[rigid->event_count++] = event_of(world, contact, false);
 }
 
 static void report_entering(es_world* world, const es_contacts* contacts, const es_contact* contact)

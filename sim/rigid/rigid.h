@@ -160,6 +160,9 @@ void es_collide_contacts(es_world* world);
 void es_report_contacts(es_world* world);
 /* After the solver: events of what it pressed together that was not expected to touch, and may be apart again when it is next looked at. */
 void es_report_pressed(es_world* world);
+/* Room for `more` events; false after es_fail. There is always room for the leaving of all contacts there are, so that a body can be destroyed
+ * when memory has run out. */
+bool es_events_reserve(es_world* world, size_t more);
 void es_report_leaving(es_world* world, const es_contact* contact);
 
 /* islands.c */
@@ -171,8 +174,10 @@ void es_body_wake(es_world* world, es_body_object* body); /* and its island */
 void es_body_wake_neighbours(es_world* world, es_body_object* body);
 /* Puts each contact on the list where it belongs. False after es_fail. */
 bool es_sort_contacts(es_world* world);
+/* Memory for the next, before bodies move; false after es_fail. */
+bool es_islands_reserve(es_world* world);
 /* After a step: islands that have been still long enough fall asleep. */
-bool es_islands_sleep(es_world* world, float h);
+void es_islands_sleep(es_world* world, float h);
 
 /* continuous.c: between the solver and the boxes */
 void es_stop_fast_bodies(es_world* world);

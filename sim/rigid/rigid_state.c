@@ -117,7 +117,8 @@ static void read_contacts(es_world* world, state_io* io, es_contacts* contacts)
         io->good = false;
         return;
     }
-    if (io->mode == CHECK && !es_contacts_reserve(world->context, contacts, counts[0], counts[1])) {
+    /* twice: the larger of both lists is then room for the events of either's leaving */
+    if (io->mode == CHECK && (!es_contacts_reserve(world->context, contacts, counts[0], counts[1]) || !es_events_reserve(world, 2 * (size_t)counts[0]))) {
         io->good = false;
         io->no_memory = true;
         return;

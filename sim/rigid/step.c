@@ -151,8 +151,8 @@ static bool touch(es_world* world)
 {
     es_rigid* rigid = world->rigid;
     if (!es_find_contacts(world)) return false;
-    size_t events = rigid->event_count + rigid->contacts.count + rigid->next.count; /* es_report_pressed's too: each of next enters once at most */
-    if (!es_grow(world->context, (void**)&rigid->events, &rigid->event_capacity, rigid->event_count, events, sizeof *rigid->events)) return false;
+    /* of this step (es_report_pressed's too: each of next enters once at most), and of all that touches after it */
+    if (!es_events_reserve(world, rigid->contacts.count + 2 * rigid->next.count + rigid->asleep.count)) return false;
     es_collide_contacts(world);
     es_report_contacts(world);
     es_contacts old = rigid->contacts;
@@ -199,13 +199,14 @@ es_result es_rigid_step(es_world* world, float h, uint32_t substeps)
     remember_poses(world);
     if (rigid->dynamic_count + rigid->kinematic_count == 0) return ES_OK;
     swap_kinematic(world);
-    bool good = touch(world) && es_solve(world, h, substeps);
+    bool good = touch(world) && es_islands_reserve(world) && es_solve(world, h, substeps);
     swap_kinematic(world);
     if (!good) return es_context_last_result(world->context);
     es_report_pressed(world);
     es_stop_fast_bodies(world);
     refresh_boxes(world, h);
-    return es_islands_sleep(world, h) ? ES_OK : es_context_last_result(world->context);
+    es_islands_sleep(world, h);
+    return ES_OK;
 }
 
 void es_rigid_begin_frame(es_world* world)

@@ -131,6 +131,7 @@ typedef struct es_soft_object {
     bool cut;                      /* the topology is not the one it was added with */
     bool planar;                   /* at rest */
     uint32_t carried;              /* particles that the layout knows */
+    bool crumpled;                 /* too many pairs to part, and the logger knows */
     /* scratch of a step, by slot */
     float *previous, *acceleration;
     float* ratio;                  /* per link lane */
@@ -170,12 +171,13 @@ typedef struct es_soft_object {
 bool es_soft_weld(es_world* world, es_soft_object* soft, const es_mesh_object* mesh);
 bool es_soft_embed(es_world* world, es_soft_object* soft, const es_mesh_object* mesh, const es_soft_solid* solid);
 
-/* soft_layout.c: from corners and tetrahedra; places, velocities are carried over by particle. False after es_fail, with the old one kept. */
-bool es_soft_lay_out(es_context* context, es_soft_object* soft);
+/* soft_layout.c: from corners and tetrahedra; places, velocities are carried over by particle. False after es_fail, with the old one kept.
+ * replaced: gets the old one, in whose arena the old places and velocities are, to be freed or put back; NULL: it is freed. */
+bool es_soft_lay_out(es_context* context, es_soft_object* soft, es_soft_layout* replaced);
 void es_soft_layout_free(es_soft_layout* layout);
 void es_soft_set_compliances(es_soft_object* soft);
 
-/* soft_anchors.c */
+/* soft_anchors.c: false after es_fail, with those there were kept */
 bool es_soft_make_anchors(es_context* context, es_soft_object* soft);
 /* Where a hold is now, relative to the body's origin. */
 es_vec3 es_soft_hold_place(const es_world* world, const es_soft_object* soft, const es_soft_hold* hold);
@@ -202,13 +204,11 @@ float es_soft_own_distance(const es_soft_object* soft);
 bool es_soft_find_pairs(es_context* context, es_soft_object* soft, float h);
 void es_soft_part_pairs(es_soft_object* soft);
 
-/* soft_tear.c: false after es_fail */
+/* soft_tear.c: false after es_fail, with all as it was */
 bool es_soft_tear_stretched(es_world* world, es_soft_object* soft);
-/* Vertices and indices of the mesh by the corners: after tearing or restoring. */
-bool es_soft_remake_indices(es_world* world, es_soft_object* soft);
 bool es_soft_make_mesh_fans(es_world* world, es_soft_object* soft, const es_mesh_object* mesh);
 void es_soft_mend(es_soft_object* soft); /* corners and masses as they were added; what follows from them must be made anew */
-/* Layout and mesh for the present corners; places are not carried over. */
+/* Layout and mesh for the present corners; places are not carried over. False after es_fail; then only part of it may be made. */
 bool es_soft_relay(es_world* world, es_soft_object* soft);
 
 #endif

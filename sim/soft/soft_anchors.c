@@ -164,7 +164,6 @@ bool es_soft_make_anchors(es_context* context, es_soft_object* soft)
     es_arena_free(&scratch);
     if (!good) {
         es_arena_free(&anchors.arena);
-        soft->anchors.active = false; /* those there are may be of another layout */
         return false;
     }
     for (uint32_t s = 0; s < layout->slot_count && wanted; s++)

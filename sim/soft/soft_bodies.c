@@ -144,7 +144,7 @@ static bool fill(es_world* world, es_soft_object* soft, es_mesh_object* mesh, co
         soft->weld = room(&soft->arena, soft->vertex_count, sizeof *soft->weld);
         if (!soft->parent || !soft->weld || !es_soft_make_mesh_fans(world, soft, mesh)) return false;
     }
-    if (!es_soft_lay_out(context, soft)) return false;
+    if (!es_soft_lay_out(context, soft, NULL)) return false;
     for (uint32_t p = 0; p < soft->particle_count; p++)
         for (int k = 0; k < 3; k++) soft->x[4 * (size_t)soft->layout.slot_of[p] + k] = soft->rest[3 * (size_t)p + k];
     memcpy(soft->before, soft->x, 4 * (size_t)soft->layout.slot_count * sizeof(float));
@@ -249,11 +249,21 @@ es_result es_world_set_soft(es_world* world, es_soft handle, const es_soft_desc*
     if (!wrong && (desc->bend_compliance < 0) != (now->bend_compliance < 0)) wrong = "whether it resists bending is decided when it is added";
     if (wrong) return es_fail(world->context, ES_INVALID_ARGUMENT, "soft body '%.64s': %s", label(soft->object.name), wrong);
     const bool reach = (desc->stretch_compliance == 0) != (now->stretch_compliance == 0);
+    const es_soft_desc before = *now;
     es_soft_take_numbers(now, desc);
+    if (reach) {
+        es_fp_environment environment = es_fp_enter();
+        const bool good = es_soft_make_anchors(world->context, soft);
+        es_fp_leave(environment);
+        if (!good) {
+            *now = before;
+            return es_context_last_result(world->context);
+        }
+    }
     es_soft_set_compliances(soft);
     es_soft_wake(soft);
     if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT, .id = handle.id, .soft = *desc});
-    return !reach || es_soft_make_anchors(world->context, soft) ? ES_OK : es_context_last_result(world->context);
+    return ES_OK;
 }
 
 void es_soft_take_numbers(es_soft_desc* now, const es_soft_desc* desc)
@@ -299,20 +309,34 @@ es_result es_world_soft_detach(es_world* world, es_soft handle, uint32_t vertex)
     if (!world) return ES_INVALID_ARGUMENT;
     es_soft_object* soft = object_of(world, handle);
     if (!soft) return ES_STALE_HANDLE;
-    uint32_t particle = vertex == ES_SOFT_ALL ? ES_SOFT_NONE : particle_for(world, soft, vertex), kept = 0;
+    const uint32_t particle = vertex == ES_SOFT_ALL ? ES_SOFT_NONE : particle_for(world, soft, vertex), count = soft->hold_count;
     if (particle == ES_SOFT_NONE && vertex != ES_SOFT_ALL) return ES_INVALID_ARGUMENT;
-    for (uint32_t i = 0; i < soft->hold_count; i++) {
-        if (vertex == ES_SOFT_ALL || soft->holds[i].particle == particle) release_hold(world, &soft->holds[i]);
-        else soft->holds[kept++] = soft->holds[i];
+    /* a vertex is held once: what is let go is one hold, or all of them */
+    uint32_t first = 0, end = count;
+    if (vertex != ES_SOFT_ALL) {
+        while (first < count && soft->holds[first].particle != particle) first++;
+        end = first < count ? first + 1 : first;
     }
-    if (kept == soft->hold_count) return ES_OK;
-    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_DETACH, .id = handle.id, .vertex = vertex});
-    soft->hold_count = kept;
+    if (first == end) return ES_OK;
+    const es_soft_hold let_go = soft->holds[first];
+    if (vertex != ES_SOFT_ALL) memmove(soft->holds + first, soft->holds + end, (count - end) * sizeof *soft->holds);
+    soft->hold_count = count - (end - first);
     es_fp_environment environment = es_fp_enter();
-    bool good = es_soft_make_anchors(world->context, soft);
+    const bool good = es_soft_make_anchors(world->context, soft);
     es_fp_leave(environment);
+    if (!good) { /* all is held as it was */
+        if (vertex != ES_SOFT_ALL) {
+            memmove(soft->holds + end, soft->holds + first, (count - end) * sizeof *soft->holds);
+            soft->holds[first] = let_go;
+        }
+        soft->hold_count = count;
+        return es_context_last_result(world->context);
+    }
+    if (vertex != ES_SOFT_ALL) release_hold(world, &let_go);
+    for (uint32_t i = 0; vertex == ES_SOFT_ALL && i < count; i++) release_hold(world, &soft->holds[i]);
     es_soft_wake(soft);
-    return good ? ES_OK : es_context_last_result(world->context);
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_SOFT_DETACH, .id = handle.id, .vertex = vertex});
+    return ES_OK;
 }
 
 es_result es_world_wake_soft(es_world* world, es_soft handle)

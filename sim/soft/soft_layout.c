@@ -388,7 +388,7 @@ void es_soft_set_compliances(es_soft_object* soft)
     for (size_t i = 0; i < (size_t)soft->layout.link_count * 8; i++) soft->layout.links[i / 8].compliance[i % 8] = of[soft->layout.kinds[i]];
 }
 
-bool es_soft_lay_out(es_context* context, es_soft_object* soft)
+bool es_soft_lay_out(es_context* context, es_soft_object* soft, es_soft_layout* replaced)
 {
     es_soft_layout layout = {0}, *old = &soft->layout;
     es_arena scratch;
@@ -414,7 +414,8 @@ bool es_soft_lay_out(es_context* context, es_soft_object* soft)
         for (int k = 0; k < 3; k++) memcpy(streams[k] + 4 * (size_t)layout.slot_of[p], from[k] + 4 * (size_t)old->slot_of[p], 4 * sizeof(float));
     }
     soft->carried = soft->particle_count;
-    es_soft_layout_free(old);
+    if (replaced) *replaced = *old;
+    else es_soft_layout_free(old);
     layout.made = true;
     *old = layout;
     soft->x = streams[0];

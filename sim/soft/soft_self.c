@@ -10,6 +10,10 @@
 #include "platform/maths.h"
 #include "platform/random.h"
 
+/* Half a gigabyte of them. A cloth has some tens a particle; one that lies in a point has half the square of its particles, and parting those
+ * one after another would take longer than anyone waits. */
+enum { MOST_PAIRS = 1 << 26 };
+
 typedef struct pair_search {
     es_soft_object* soft;
     float cell, reach2, rest2;
@@ -115,8 +119,14 @@ bool es_soft_find_pairs(es_context* context, es_soft_object* soft, float h)
         total += own;
     }
     if (total == 0) return true;
-    if (total > 1u << 26) total = 0; /* crumpled into a point: there is no parting that */
-    if (total == 0) return true;
+    if (total > MOST_PAIRS) {
+        if (!soft->crumpled)
+            es_log(context, ES_LOG_WARNING, ES_OK, "soft body '%.64s': %llu pairs of its particles are close, more than %u: it passes through itself until they part", soft->object.name ? soft->object.name : "",
+                (unsigned long long)total, MOST_PAIRS);
+        soft->crumpled = true;
+        return true;
+    }
+    soft->crumpled = false;
     if (!es_grow(context, (void**)&soft->pairs, &soft->pair_capacity, 0, 2 * (size_t)total, sizeof *soft->pairs)) return false;
     search.fill = true;
     es_parallel_for(context, slots, 256, search_body, &search);

@@ -121,6 +121,7 @@ void es_visit_soft(es_world* world, state_io* io, es_soft_object* soft)
     if (io->mode == APPLY && io->good) {
         bool good = !(was_cut || soft->cut) || es_soft_relay(world, soft);
         if (!good || !es_soft_make_anchors(world->context, soft)) {
+            soft->anchors.active = false; /* those there are may be of another layout */
             io->good = false; /* memory ran out half-way: nothing of this cloth can be relied on, but nothing is out of bounds either */
             io->no_memory = true;
             return;

@@ -1,7 +1,7 @@
 /* One fixed step of a cloth or soft body: small steps of one iteration (Macklin et al. 2019, alg. 1).
  *
  * A substep of a band is: contact and velocities of the substep before, motion, what is held, reach, its own links and volumes, then the seam
- * with the band before it. All bands of all substeps are the tasks of one parallel loop, handed out in order, substep by substep; a task
+ * with the band before it. All bands of all substeps are the tasks of one parallel loop, which hands them out in order (es_parallel_for), substep by substep; a task
  * waits until those before it that it needs are done:
  *
  *     own part of (s, b)    needs (s - 1, b) and (s - 1, b + 1), which solved the seams of b
@@ -12,7 +12,6 @@
  * of which there would be two per substep. */
 #include "sim/soft/soft.h"
 
-#include <sched.h>
 #include <stdatomic.h>
 #include <string.h>
 
@@ -38,11 +37,7 @@ typedef struct step_job {
 
 static void wait_for(atomic_uint* done, uint32_t least)
 {
-    for (uint32_t tries = 0; atomic_load_explicit(done, memory_order_acquire) < least; tries++)
-        if (tries > 4096) sched_yield();
-#if defined(__x86_64__)
-        else __builtin_ia32_pause();
-#endif
+    for (uint32_t turns = 0; atomic_load_explicit(done, memory_order_acquire) < least;) es_wait_a_little(&turns);
 }
 
 /* Planes hold for the whole step; their shape's surface moves on with `velocity`. */

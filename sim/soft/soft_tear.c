@@ -127,33 +127,121 @@ static void tear(es_soft_object* soft, uint32_t a, uint32_t b)
     if (!part(soft, a, b) && !part(soft, b, a)) drop(soft, a, b);
 }
 
-/* Particles that the layout does not know go back into those they came from. */
-static void forget_new(es_soft_object* soft)
+/* ---- what follows from the topology ------------------------------------------------------------------------------------------- */
+
+/* The mesh that shows the corners, made apart from the one that is shown. */
+typedef struct torn_mesh { es_arena arena; uint32_t *indices, *particle_at, *source, *weld, used; es_vertex_fans fans; } torn_mesh;
+
+static void* copy_of(es_arena* arena, const void* from, size_t bytes)
 {
-    const uint32_t known = soft->carried, first = soft->first_particles;
-    for (size_t i = 0; i < 3 * (size_t)soft->triangle_count; i++)
-        if (soft->corners[i] != ES_SOFT_NONE && soft->corners[i] >= known) soft->corners[i] = soft->parent[soft->corners[i] - first];
-    for (uint32_t p = known; p < soft->particle_count; p++) soft->mass[soft->parent[p - first]] += soft->mass[p];
-    soft->particle_count = known;
+    void* copy = es_arena_allocate(arena, bytes ? bytes : 1);
+    if (copy) memcpy(copy, from, bytes);
+    return copy;
 }
 
-/* Everything that follows from the topology, anew. */
-bool es_soft_retopologize(es_world* world, es_soft_object* soft)
+/* Vertices of one particle share their normal. */
+static void weld_vertices(const uint32_t* particle_at, uint32_t count, uint32_t* first, uint32_t* weld)
 {
-    const uint32_t known = soft->carried;
-    if (!es_soft_lay_out(world->context, soft)) {
-        forget_new(soft);
+    for (uint32_t v = 0; v < count; v++) {
+        uint32_t p = particle_at[v];
+        if (first[p] == ES_SOFT_NONE) first[p] = v;
+        weld[v] = first[p];
+    }
+}
+
+/* A corner whose particle is no longer its vertex's gets a vertex of the reserve, one per (vertex, particle), in the order of triangles. */
+static void show_corners(const es_soft_object* soft, torn_mesh* m, uint32_t* chain)
+{
+    m->used = soft->first_vertices;
+    for (uint32_t t = 0; t < soft->triangle_count; t++) {
+        const uint32_t *c = soft->corners + 3 * (size_t)t, *from = soft->mesh_indices + 3 * (size_t)t;
+        uint32_t v[3];
+        bool there = c[0] != ES_SOFT_NONE;
+        for (int k = 0; k < 3 && there; k++) {
+            v[k] = from[k];
+            uint32_t end = v[k];
+            while (v[k] != ES_SOFT_NONE && m->particle_at[v[k]] != c[k]) {
+                end = v[k];
+                v[k] = chain[v[k]];
+            }
+            if (v[k] != ES_SOFT_NONE) continue;
+            there = m->used < soft->vertex_count;
+            if (!there) break;
+            v[k] = chain[end] = m->used++;
+            m->particle_at[v[k]] = c[k];
+            m->source[v[k]] = from[k];
+        }
+        for (int k = 0; k < 3; k++) m->indices[3 * (size_t)t + k] = there ? v[k] : from[0];
+    }
+    for (uint32_t v = m->used; v < soft->vertex_count; v++) m->particle_at[v] = m->source[v] = 0;
+}
+
+static bool make_torn_mesh(es_world* world, const es_soft_object* soft, const es_mesh_object* mesh, torn_mesh* m)
+{
+    const size_t vertices = soft->vertex_count * sizeof(uint32_t), particles = soft->particle_room * sizeof(uint32_t);
+    *m = (torn_mesh){0};
+    es_arena_init(&m->arena, world->context, 1 << 16);
+    m->indices = copy_of(&m->arena, mesh->indices, 3 * (size_t)mesh->raster.triangle_count * sizeof *m->indices);
+    m->particle_at = copy_of(&m->arena, soft->particle_at, vertices);
+    m->source = copy_of(&m->arena, soft->vertex_source, vertices);
+    m->weld = es_arena_allocate(&m->arena, vertices);
+    uint32_t *chain = es_arena_allocate(&m->arena, vertices), *first = es_arena_allocate(&m->arena, particles); /* vertex, or its copies: the next copy */
+    bool good = m->indices && m->particle_at && m->source && m->weld && chain && first;
+    if (good) {
+        memset(chain, 0xff, vertices);
+        memset(first, 0xff, particles);
+        show_corners(soft, m, chain);
+        weld_vertices(m->particle_at, soft->vertex_count, first, m->weld);
+        good = es_vertex_fans_make(world->context, m->indices, mesh->raster.triangle_count, soft->vertex_count, m->weld, &m->fans);
+    }
+    if (!good) es_arena_free(&m->arena);
+    return good;
+}
+
+static void show_torn_mesh(es_world* world, es_soft_object* soft, es_mesh_object* mesh, torn_mesh* m)
+{
+    const size_t vertices = soft->vertex_count * sizeof(uint32_t);
+    memcpy(mesh->indices, m->indices, 3 * (size_t)mesh->raster.triangle_count * sizeof *m->indices);
+    memcpy(soft->particle_at, m->particle_at, vertices);
+    memcpy(soft->vertex_source, m->source, vertices);
+    memcpy(soft->weld, m->weld, vertices);
+    soft->vertex_used = m->used;
+    for (uint32_t v = soft->first_vertices; v < m->used; v++) es_mesh_copy_vertex(mesh, v, m->source[v]);
+    if (soft->mesh_fans.first_row) es_vertex_fans_free(world->context, &soft->mesh_fans);
+    soft->mesh_fans = m->fans;
+    es_arena_free(&m->arena);
+    soft->posed = false;
+    es_mesh_reindexed(world, mesh);
+}
+
+/* Everything that follows from the topology, anew; when memory does not suffice, it is all as it was. */
+static bool retopologize(es_world* world, es_soft_object* soft)
+{
+    es_mesh_object* mesh = es_slots_get(&world->slots[ES_OBJECT_MESH], soft->desc.mesh.id);
+    const es_soft_object before = *soft;
+    torn_mesh shown;
+    es_soft_layout replaced;
+    if (!make_torn_mesh(world, soft, mesh, &shown)) return false;
+    bool good = es_soft_lay_out(world->context, soft, &replaced);
+    if (good) {
+        for (uint32_t p = before.carried; p < soft->particle_count; p++) {
+            size_t to = 4 * (size_t)soft->layout.slot_of[p], from = 4 * (size_t)soft->layout.slot_of[soft->parent[p - soft->first_particles]];
+            memcpy(soft->x + to, soft->x + from, 4 * sizeof(float));
+            memcpy(soft->velocity + to, soft->velocity + from, 4 * sizeof(float));
+            memcpy(soft->before + to, soft->before + from, 4 * sizeof(float));
+        }
+        good = es_soft_make_anchors(world->context, soft);
+        es_soft_layout_free(good ? &replaced : &soft->layout);
+    }
+    if (!good) {
+        *soft = before;
+        es_vertex_fans_free(world->context, &shown.fans);
+        es_arena_free(&shown.arena);
         return false;
     }
-    for (uint32_t p = known; p < soft->particle_count; p++) {
-        size_t to = 4 * (size_t)soft->layout.slot_of[p], from = 4 * (size_t)soft->layout.slot_of[soft->parent[p - soft->first_particles]];
-        memcpy(soft->x + to, soft->x + from, 4 * sizeof(float));
-        memcpy(soft->velocity + to, soft->velocity + from, 4 * sizeof(float));
-        memcpy(soft->before + to, soft->before + from, 4 * sizeof(float));
-    }
-    if (!es_soft_make_anchors(world->context, soft)) return false;
     es_soft_wake(soft);
-    return es_soft_remake_indices(world, soft);
+    show_torn_mesh(world, soft, mesh, &shown);
+    return true;
 }
 
 void es_soft_mend(es_soft_object* soft)
@@ -164,8 +252,12 @@ void es_soft_mend(es_soft_object* soft)
 
 bool es_soft_relay(es_world* world, es_soft_object* soft)
 {
+    es_mesh_object* mesh = es_slots_get(&world->slots[ES_OBJECT_MESH], soft->desc.mesh.id);
+    torn_mesh shown;
     soft->carried = 0;
-    return es_soft_lay_out(world->context, soft) && es_soft_remake_indices(world, soft);
+    if (!es_soft_lay_out(world->context, soft, NULL) || !make_torn_mesh(world, soft, mesh, &shown)) return false;
+    show_torn_mesh(world, soft, mesh, &shown);
+    return true;
 }
 
 typedef struct torn_edge { uint32_t a, b; } torn_edge; /* b ES_SOFT_NONE: all round a */
@@ -173,14 +265,32 @@ typedef struct torn_edge { uint32_t a, b; } torn_edge; /* b ES_SOFT_NONE: all ro
 static bool tear_edges(es_world* world, es_soft_object* soft, const torn_edge* edges, uint32_t count)
 {
     if (count == 0) return true;
-    uint32_t before = soft->torn;
+    /* corners and masses, to be put back if the rest finds no memory */
+    es_arena kept;
+    es_arena_init(&kept, world->context, 1 << 16);
+    const size_t corner_bytes = 3 * (size_t)soft->triangle_count * sizeof *soft->corners, mass_bytes = soft->particle_count * sizeof *soft->mass;
+    const uint32_t *corners = copy_of(&kept, soft->corners, corner_bytes), before = soft->torn, particles = soft->particle_count;
+    const float* masses = copy_of(&kept, soft->mass, mass_bytes);
+    if (!corners || !masses) {
+        es_arena_free(&kept);
+        return false;
+    }
     for (uint32_t i = 0; i < count; i++) {
         if (edges[i].b == ES_SOFT_NONE) explode(soft, edges[i].a);
         else tear(soft, edges[i].a, edges[i].b);
     }
-    if (soft->torn == before) return true;
-    soft->cut = true;
-    return es_soft_retopologize(world, soft);
+    const bool was_cut = soft->cut;
+    soft->cut |= soft->torn != before;
+    const bool good = soft->torn == before || retopologize(world, soft);
+    if (!good) {
+        memcpy(soft->corners, corners, corner_bytes);
+        memcpy(soft->mass, masses, mass_bytes);
+        soft->particle_count = particles;
+        soft->torn = before;
+        soft->cut = was_cut;
+    }
+    es_arena_free(&kept);
+    return good;
 }
 
 bool es_soft_tear_stretched(es_world* world, es_soft_object* soft)
@@ -245,57 +355,12 @@ es_result es_world_soft_tear(es_world* world, es_soft soft_handle, const double 
     return good ? ES_OK : es_context_last_result(world->context);
 }
 
-/* A corner whose particle is no longer its vertex's gets a vertex of the reserve, one per (vertex, particle), in the order of triangles. */
-bool es_soft_remake_indices(es_world* world, es_soft_object* soft)
-{
-    es_mesh_object* mesh = es_slots_get(&world->slots[ES_OBJECT_MESH], soft->desc.mesh.id);
-    const uint32_t first = soft->first_vertices;
-    uint32_t* chain = es_allocate_array(world->context, soft->vertex_count, sizeof *chain); /* vertex, or its copies: the next copy */
-    if (!chain) return false;
-    memset(chain, 0xff, soft->vertex_count * sizeof *chain);
-    soft->vertex_used = first;
-    for (uint32_t t = 0; t < soft->triangle_count; t++) {
-        const uint32_t *c = soft->corners + 3 * (size_t)t, *from = soft->mesh_indices + 3 * (size_t)t;
-        uint32_t v[3];
-        bool there = c[0] != ES_SOFT_NONE;
-        for (int k = 0; k < 3 && there; k++) {
-            v[k] = from[k];
-            uint32_t end = v[k];
-            while (v[k] != ES_SOFT_NONE && soft->particle_at[v[k]] != c[k]) {
-                end = v[k];
-                v[k] = chain[v[k]];
-            }
-            if (v[k] != ES_SOFT_NONE) continue;
-            there = soft->vertex_used < soft->vertex_count;
-            if (!there) break;
-            v[k] = chain[end] = soft->vertex_used++;
-            soft->particle_at[v[k]] = c[k];
-            soft->vertex_source[v[k]] = from[k];
-            es_mesh_copy_vertex(mesh, v[k], from[k]);
-        }
-        for (int k = 0; k < 3; k++) mesh->indices[3 * (size_t)t + k] = there ? v[k] : from[0];
-    }
-    es_release(world->context, chain, soft->vertex_count * sizeof *chain);
-    for (uint32_t v = soft->vertex_used; v < soft->vertex_count; v++) {
-        soft->particle_at[v] = 0;
-        soft->vertex_source[v] = 0;
-    }
-    soft->posed = false;
-    es_mesh_reindexed(world, mesh);
-    return es_soft_make_mesh_fans(world, soft, mesh);
-}
-
-/* Vertices of one particle share their normal. */
 bool es_soft_make_mesh_fans(es_world* world, es_soft_object* soft, const es_mesh_object* mesh)
 {
     uint32_t* first = es_allocate_array(world->context, soft->particle_room, sizeof *first);
     if (!first) return false;
     memset(first, 0xff, soft->particle_room * sizeof *first);
-    for (uint32_t v = 0; v < soft->vertex_count; v++) {
-        uint32_t p = soft->particle_at[v];
-        if (first[p] == ES_SOFT_NONE) first[p] = v;
-        soft->weld[v] = first[p];
-    }
+    weld_vertices(soft->particle_at, soft->vertex_count, first, soft->weld);
     es_release(world->context, first, soft->particle_room * sizeof *first);
     es_vertex_fans fans;
     if (!es_vertex_fans_make(world->context, mesh->indices, mesh->raster.triangle_count, soft->vertex_count, soft->weld, &fans)) return false;
