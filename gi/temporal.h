@@ -11,6 +11,9 @@
  *     confidence = base · saturate(1 - max(Δpos, Δnormal, Δillumination)) (1 - reset)                eq. 3.4, 3.5; reset as below
  *     I = I_prev confidence + I_new (1 - confidence)                                                 eq. 3.6
  *
+ * What a lobe reflects stays where it is while the surface turns under it, so that its history is of another direction: the confidence in planes
+ * 3 … 5 falls by (1 - n · n_prev) lobe_turn as well, to nothing where the surface has turned by a lobe's half width.
+ *
  * I in eq. 3.3 is what a white surface would show at the frame's exposure: exposure (irradiance / pi + what the lobe reflects), over R, G, B.
  * With `clamp` I_prev is then brought into the range of I_new over 3 × 3 pixels, widened by that share.
  *
@@ -45,6 +48,7 @@ typedef struct es_temporal_job {
     uint8_t* result_lit;
     float* confidence;                /* NULL: not wanted */
     float base, position, normal, illumination;
+    float lobe_turn;                  /* 2 / a², a the narrowest lobe's half width in radians (1 - cos t is t² / 2); 0: lobes are as the rest */
     float extent;                     /* metres */
     float exposure_scale;             /* 2^stops */
     float depth_threshold, normal_threshold;

@@ -168,6 +168,8 @@ static es_result blend(es_renderer* r, const es_frame_inputs* in)
     es_temporal_job job = {.gbuffer = shaded, .previous = redrawn ? half ? &h->half : &h->gbuffer : shaded, .moving = h->moving, .plane_count = r->has_specular ? 6 : 3,
         .base = s->temporal_base, .position = s->temporal_position, .normal = s->temporal_normal, .illumination = s->temporal_illumination, .extent = in->extent, .exposure_scale = es_exp2(s->exposure),
         .depth_threshold = s->temporal_depth_threshold, .normal_threshold = s->temporal_normal_threshold, .clamp = s->temporal_clamp};
+    const float width = es_maxf(s->lobe_roughness, 0.1f) * es_maxf(s->lobe_roughness, 0.1f);
+    job.lobe_turn = 2.0f / (width * width);
     job.reset_low = s->temporal_reset_low * (1.0f - 0.95f * h->alert);
     job.reset_high = s->temporal_reset_high * (1.0f - 0.9f * h->alert);
     job.history_count = h->settled ? 0 : h->planes < job.plane_count ? h->planes : job.plane_count;

@@ -84,7 +84,7 @@ static void set_up(setup* s, uint32_t trial)
             s->then.normal[i] = es_pack_normal(es_v3(0, 1, 0.05f));
         }
     s->job = (es_temporal_job){.gbuffer = &s->now, .previous = &s->then, .moving = movement != STILL, .plane_count = trial % 2 ? 3 : 6, .base = uniform(0, 0.999f), .position = uniform(0, 3), .normal = uniform(0, 3),
-        .illumination = uniform(0, 2), .extent = uniform(1, 10), .exposure_scale = uniform(0.1f, 4), .depth_threshold = 0.1f, .normal_threshold = 0.8f, .clamp = trial % 5 == 0 ? 0.25f : 0.0f, .reset_low = 0.1f, .reset_high = 0.5f,
+        .illumination = uniform(0, 2), .lobe_turn = trial % 3 ? uniform(0, 20) : 0.0f, .extent = uniform(1, 10), .exposure_scale = uniform(0.1f, 4), .depth_threshold = 0.1f, .normal_threshold = 0.8f, .clamp = trial % 5 == 0 ? 0.25f : 0.0f, .reset_low = 0.1f, .reset_high = 0.5f,
         .depth_then = {{uniform(-0.01f, 0.01f), uniform(0, 1e-4f), uniform(0, 1e-4f)}, {1, uniform(0, 1e-4f), uniform(0, 1e-4f)}}};
     s->job.history_count = trial % 7 == 3 ? 0 : s->job.plane_count == 6 && trial % 4 ? 6 : 3;
     s->job.tile_columns = es_temporal_tiles(width);
@@ -305,7 +305,8 @@ static outcome by_equations(const es_temporal_job* job, uint32_t x, uint32_t y)
                 }
             old[k] = fmax(low * (1 - (double)job->clamp), fmin(high * (1 + (double)job->clamp), old[k]));
         }
-        o.value[k] = old[k] * o.confidence + o.value[k] * (1 - o.confidence);
+        const double share = o.confidence * (k < 3 ? 1 : fmax(1 - (1 - dot / total) * (double)job->lobe_turn, 0));
+        o.value[k] = old[k] * share + o.value[k] * (1 - share);
     }
     return o;
 }

@@ -270,8 +270,9 @@ VINL bool blend_pixels(const es_temporal_job* job, uint32_t x0, uint32_t x1, uin
                     old.light[k] = vf_min(vf_max(old.light[k], low * vf_set1(1.0f - job->clamp)), high * vf_set1(1.0f + job->clamp));
                 }
             /* as a step from the new value: where both are equal, it stays exactly */
+            const vf in_lobe = with_history == 6 ? confidence * vf_max(one - (one - old.dot) * vf_set1(job->lobe_turn), zero) : confidence;
             for (uint32_t k = 0; k < with_history; k++) {
-                fresh[k] = fresh[k] + confidence * (old.light[k] - fresh[k]);
+                fresh[k] = fresh[k] + (k < 3 ? confidence : in_lobe) * (old.light[k] - fresh[k]);
                 fresh[k] = vf_and(vm_gt(vf_abs(fresh[k]), vf_set1(ES_TINY)), fresh[k]);
             }
         }
