@@ -571,18 +571,33 @@ static uint32_t find_visible(es_resolve_job* job, const es_tile* tile, uint32_t 
     return count;
 }
 
-/* Step 3 for eight pixels. The masks of `t` are the pixels seen. */
-VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi id_numbers, const uint32_t* triangle_ids, vf x, vf y)
+/* Four numbers of eight pixels' records, which are one and the same when `one`: a constant at every call. */
+VINL void read_record(const char* record, const uint32_t offset[VW], bool one, vf* a, vf* b, vf* c, vf* d)
+{
+    if (!one) {
+        gather_vertex(record, offset, a, b, c, d);
+        return;
+    }
+    float words[4];
+    memcpy(words, record + offset[0], sizeof words);
+    *a = vf_set1(words[0]);
+    *b = vf_set1(words[1]);
+    *c = vf_set1(words[2]);
+    *d = vf_set1(words[3]);
+}
+
+/* Step 3 for eight pixels. The masks of `t` are the pixels seen; `one`: they show one triangle. */
+VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi id_numbers, const uint32_t* triangle_ids, vf x, vf y, bool one)
 {
     const es_gbuffer* g = &job->gbuffer;
     const uint32_t planes = g->planes;
     const char* records = (const char*)job->visible;
     uint32_t offset[VW];
     vi_store(offset, slot << 7);
-    keep_in_memory(offset);
+    if (!one) keep_in_memory(offset);
     vf px, py, pc, ox, oy, low, high, word;
-    gather_vertex(records, offset, &px, &py, &pc, &ox);
-    gather_vertex(records + 16, offset, &low, &high, &oy, &word);
+    read_record(records, offset, one, &px, &py, &pc, &ox);
+    read_record(records + 16, offset, one, &low, &high, &oy, &word);
     vi tag = vi_from_bits(word);
     ox = x - ox;
     oy = y - oy;
@@ -594,11 +609,11 @@ VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi
     if (planes & (ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_NORMAL | ES_GBUFFER_TRIANGLE | ES_GBUFFER_INSTANCE)) {
         v3 n;
         vf geometric, triangle, instance_id;
-        gather_vertex(records + 32, offset, &px, &py, &pc, &geometric);
+        read_record(records + 32, offset, one, &px, &py, &pc, &geometric);
         n.x = px * ox + py * oy + pc;
-        gather_vertex(records + 48, offset, &px, &py, &pc, &triangle);
+        read_record(records + 48, offset, one, &px, &py, &pc, &triangle);
         n.y = px * ox + py * oy + pc;
-        gather_vertex(records + 64, offset, &px, &py, &pc, &instance_id);
+        read_record(records + 64, offset, one, &px, &py, &pc, &instance_id);
         n.z = px * ox + py * oy + pc;
         if (planes & ES_GBUFFER_GEOMETRIC_NORMAL) put(t, g->geometric_normal, vi_from_bits(geometric));
         if (planes & ES_GBUFFER_TRIANGLE) put(t, g->triangle, vi_from_bits(triangle));
@@ -607,11 +622,11 @@ VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi
     }
     if (planes & (ES_GBUFFER_ALBEDO | ES_GBUFFER_SURFACE | ES_GBUFFER_EMISSION)) {
         vf surface, emission, material;
-        gather_vertex(records + 80, offset, &px, &py, &pc, &surface);
+        read_record(records + 80, offset, one, &px, &py, &pc, &surface);
         vf red = (px * ox + py * oy + pc) * w;
-        gather_vertex(records + 96, offset, &px, &py, &pc, &emission);
+        read_record(records + 96, offset, one, &px, &py, &pc, &emission);
         vf green = (px * ox + py * oy + pc) * w;
-        gather_vertex(records + 112, offset, &px, &py, &pc, &material);
+        read_record(records + 112, offset, one, &px, &py, &pc, &material);
         vf blue = (px * ox + py * oy + pc) * w;
         if (planes & ES_GBUFFER_SURFACE) put(t, g->surface, vi_from_bits(surface));
         if (planes & ES_GBUFFER_EMISSION) put(t, g->emission, vi_from_bits(emission));
@@ -679,7 +694,9 @@ void ES_KERNEL(es_resolve_tile)(es_resolve_job* job, const es_tile* tile)
             pixels += (uint32_t)__builtin_popcount(bits);
             vf x = vf_set1((float)(tile->x + (int32_t)column) + 0.5f - 0.5f * (float)tile->width) + vf_iota();
             target t = {g, line + column, seen, true};
-            resolve_pixels(job, &t, vi_gather(job->slot, number) - vi_set1(1), number, tile->triangle_ids, x, y);
+            const int32_t first = number[0];
+            if (vm_all(seen & vi_eq(number, vi_set1(first)))) resolve_pixels(job, &t, vi_set1((int32_t)job->slot[first] - 1), number, tile->triangle_ids, x, y, true);
+            else resolve_pixels(job, &t, vi_gather(job->slot, number) - vi_set1(1), number, tile->triangle_ids, x, y, false);
         }
     }
     for (uint32_t i = 1; i < visible; i++) job->slot[job->slot_number[i]] = 0;
