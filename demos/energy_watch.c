@@ -29,7 +29,7 @@ struct energy_watch {
     touch* touches;          /* a hashed table; free where a == b */
     uint32_t capacity, used; /* capacity: a power of two */
     uint32_t steps;
-    double* sums;            /* per group: energy before, after, mass */
+    double* sums;            /* per group: energy before, after, what all are allowed */
     energy_gain worst;
 };
 
@@ -271,6 +271,8 @@ static void see_softs(energy_watch* w, es_world* world)
 
 /* ---- judging -------------------------------------------------------------------------------------------------------------------- */
 
+static double allowed_of(const member* m) { return m->mass * 9.81 * (m->soft ? ENERGY_SOFT_HEIGHT : ENERGY_HEIGHT) + ENERGY_SHARE * m->peak; }
+
 static void judge(energy_watch* w, es_world* world)
 {
     for (uint32_t i = 0; i < w->capacity; i++)
@@ -287,7 +289,8 @@ static void judge(energy_watch* w, es_world* world)
         double kinetic, *sum = &w->sums[3 * (size_t)root];
         sum[0] += m->energy;
         sum[1] += energy_of(world, m, &kinetic);
-        sum[2] += m->mass;
+        if (kinetic > m->peak) m->peak = kinetic;
+        sum[2] += allowed_of(m);
     }
     for (uint32_t i = 0; i < w->count; i++) {
         member* m = &w->members[i];
@@ -300,8 +303,8 @@ static void judge(energy_watch* w, es_world* world)
             continue;
         }
         w->worst.judged++;
-        m->gain = fmax(0, m->gain + (sum[2] > 0 ? (sum[1] - sum[0]) * m->mass / sum[2] : 0));
-        const double allowed = m->mass * 9.81 * (m->soft ? ENERGY_SOFT_HEIGHT : ENERGY_HEIGHT) + ENERGY_SHARE * m->peak;
+        const double allowed = allowed_of(m);
+        m->gain = fmax(0, m->gain + (sum[2] > 0 ? (sum[1] - sum[0]) * allowed / sum[2] : 0));
         if (w->worst.id && m->gain * w->worst.allowed <= w->worst.joules * allowed) continue;
         w->worst.joules = m->gain;
         w->worst.allowed = allowed;

@@ -9,7 +9,7 @@
  *   - is a soft body that is attached to anything, blown at or under pressure, or was near one of these.
  * Forces, impulses and velocities that the caller applies are not known here: what they add counts as gained.
  *
- * What a group gains is charged to its members by their mass, and what it loses is taken off again, but never below nothing; so a small gain in
+ * What a group gains is charged to its members by what each is allowed, and what it loses is taken off again, but never below nothing; so a small gain in
  * each window adds up, and trembling about a mean does not. A member that was driven begins anew. Contacts that give way a little store and
  * return energy that is not seen here, so each member is allowed that of ENERGY_HEIGHT m of height under 9.81 m/s² (soft bodies:
  * ENERGY_SOFT_HEIGHT); bounces without loss are solved to some percent, so ENERGY_SHARE of the most kinetic energy it had since it was driven. */

@@ -182,6 +182,14 @@ if play cornell --size 640x480 "${small[@]}"; then
     checks=$((checks + 1))
     has '--set vpl.count=64' "$line" || fail "the settings lack what was given: $line"
 
+    # faster than frames come: every press counts
+    xdotool key --delay 1 equal equal equal equal equal equal equal equal
+    sleep $delay
+    line=$(settings)
+    checks=$((checks + 1))
+    has '--set exposure=2' "$line" || fail "eight presses of + are not two stops: $line"
+    xdotool key --delay 1 minus minus minus minus minus minus minus minus
+
     # a setting found by its name, stepped by the arrow keys
     key slash
     xdotool type --delay $(awk -v d=$delay 'BEGIN { print int(d * 1000) }') 'exposure'
