@@ -5,7 +5,8 @@
  *
  * TEMPORAL: the new picture is blended with last frame's, looked up where the pixel was (its centre's motion: the previous projection is
  * moved as well, so that what stands still has none) between four pixels, and brought into the range of the
- * new picture's 3 × 3 neighbours, so that what is new or newly lit leaves no trail (Karis 2014, "High-Quality Temporal Supersampling").
+ * new picture's 3 × 3 neighbours, so that what is new or newly lit leaves no trail (Karis 2014, "High-Quality Temporal Supersampling"). Moving
+ * metal, whose reflections do not move with it, takes a larger share of the new picture.
  * While nothing changes, frame n of them weighs 1 / (1 / blend + n), and from the ES_ANTIALIAS_STILL-th on history is not clamped: the picture
  * becomes the mean over all places, and settles with the rest of the frame (gi/history.h).
  * SUPERSAMPLE: the mean over pictures at places 0 … samples - 1.
@@ -27,7 +28,7 @@ void es_antialias_place(uint32_t index, float place[2]);
 void es_antialias_jitter(es_raster_view* view, const float place[2]);
 
 typedef struct es_antialias_job {
-    const es_gbuffer* gbuffer;     /* motion where `moving` */
+    const es_gbuffer* gbuffer;     /* motion and surface where `moving` */
     bool moving;
     bool clamp;
     float blend;                   /* share of the new picture: 1 where there is no history */

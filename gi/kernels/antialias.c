@@ -26,8 +26,12 @@ VINL rgb unshown(rgb c, vf exposure)
     return (rgb){{c.at[0] * share, c.at[1] * share, c.at[2] * share}};
 }
 
-/* The nearest pixel inside stands in for what is outside. */
-VINL rgb history_at(const es_antialias_job* job, uint32_t x, uint32_t y, vf exposure, vm* known)
+/* What a polished surface shows does not move as the surface does: of moving metal, a fourth at least, the new picture has ES_METAL_SHARE. */
+#define ES_METAL_SHARE 0.4f
+VINL vm is_metal(const es_gbuffer* g, size_t at) { return vi_gt(vi_load(g->surface + at) & vi_set1(0xff), vi_set1(63)); }
+
+/* `share` of the new picture goes with it. The nearest pixel inside stands in for what is outside. */
+VINL rgb history_at(const es_antialias_job* job, uint32_t x, uint32_t y, vf exposure, vf* share)
 {
     const es_gbuffer* g = job->gbuffer;
     const size_t at = (size_t)y * g->stride + x;
@@ -37,11 +41,13 @@ VINL rgb history_at(const es_antialias_job* job, uint32_t x, uint32_t y, vf expo
         mx = vf_load(g->motion_x + at);
         my = vf_load(g->motion_y + at);
     }
-    *known = vm_all_lanes();
-    if (!vm_any(vm_ne(mx, zero) | vm_ne(my, zero))) return shown(load(job->history, at), exposure);
+    *share = vf_set1(job->blend);
+    const vm moved = vm_ne(mx, zero) | vm_ne(my, zero);
+    if (!vm_any(moved)) return shown(load(job->history, at), exposure);
     const vf limit = vf_set1(16384.0f), width = vf_set1((float)(g->width - 1)), height = vf_set1((float)(g->height - 1));
     const vf px = vf_min(vf_max(vf_set1((float)x) + vf_iota() - mx, vf_neg(limit)), limit), py = vf_min(vf_max(vf_set1((float)y) - my, vf_neg(limit)), limit);
-    *known = vm_gt(px, vf_set1(-0.5f)) & vm_lt(px, width + vf_set1(0.5f)) & vm_gt(py, vf_set1(-0.5f)) & vm_lt(py, height + vf_set1(0.5f));
+    const vm known = vm_gt(px, vf_set1(-0.5f)) & vm_lt(px, width + vf_set1(0.5f)) & vm_gt(py, vf_set1(-0.5f)) & vm_lt(py, height + vf_set1(0.5f));
+    *share = vf_select(known, vf_select(moved & is_metal(g, at), vf_max(vf_set1(ES_METAL_SHARE), *share), *share), one);
     const vf fx = vf_floor(px), fy = vf_floor(py), right = px - fx, down = py - fy;
     const vi ix = vi_truncate(fx), iy = vi_truncate(fy), last_x = vi_set1((int32_t)g->width - 1), last_y = vi_set1((int32_t)g->height - 1);
     const int32_t x0 = ix[0], y0 = iy[0];
@@ -109,14 +115,13 @@ VINL void resolve(const es_antialias_job* job, uint32_t x, uint32_t y, rgb new, 
 {
     const size_t at = (size_t)y * job->gbuffer->stride + x;
     const vf exposure = vf_set1(job->exposure_scale);
-    vm known;
-    rgb old = history_at(job, x, y, exposure, &known);
+    vf share;
+    rgb old = history_at(job, x, y, exposure, &share);
     for (int k = 0; k < 3 && range; k++) {
         const float *low = range->low[k] + (x + VW - range->x0), *high = range->high[k] + (x + VW - range->x0);
         const vf least = vf_min(vf_min(vf_load(low - 1), vf_load(low)), vf_load(low + 1)), most = vf_max(vf_max(vf_load(high - 1), vf_load(high)), vf_load(high + 1));
         old.at[k] = vf_min(vf_max(old.at[k], least), most);
     }
-    const vf share = vf_select(known, vf_set1(job->blend), vf_set1(1.0f));
     rgb mixed;
     for (int k = 0; k < 3; k++) mixed.at[k] = old.at[k] + share * (new.at[k] - old.at[k]);
     mixed = unshown(mixed, exposure);
