@@ -426,10 +426,10 @@ static void scatter_lobes(const es_shade_job* job, const lanes_of_phase* p, cons
     }
 }
 
-/* A phase without lights. */
-static void darken(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch)
+/* A phase without lights; whole_row: as are all of its row, which is not put together from phases. */
+static void darken(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool whole_row)
 {
-    for (int k = 0; k < 3; k++) memset(batch->words[k][p->phase_x], 0, (size_t)p->lanes * p->rows * sizeof(uint32_t));
+    for (int k = 0; k < 3 && !whole_row; k++) memset(batch->words[k][p->phase_x], 0, (size_t)p->lanes * p->rows * sizeof(uint32_t));
     for (uint32_t j = 0; j < p->rows && job->specular[0]; j++) {
         const size_t row = (size_t)(p->y0 + j * job->interleave) * job->gbuffer->stride + p->x0;
         for (int k = 0; k < 3; k++)
@@ -488,9 +488,13 @@ void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* light
     }
     for (uint32_t phase_x = 0; phase_x < n && phase_x < width; phase_x++) {
         const lanes_of_phase p = {.x0 = x0 + phase_x, .columns = (width - phase_x + n - 1) / n, .lanes = lanes, .y0 = y0, .rows = rows, .phase_x = phase_x};
-        if (phase_x + n * block->phase_y >= job->vpl_count && !job->near) darken(job, &p, batch);
+        if (phase_x + n * block->phase_y >= job->vpl_count && !job->near) darken(job, &p, batch, !any);
         else shade_phase(job, lights, &p, phase_x + n * block->phase_y, batch);
     }
     for (uint32_t j = 0; j < rows; j++)
-        for (int k = 0; k < 3; k++) es_merge_row(batch->words[k][0] + j * lanes, ES_SHADE_PHASE_STRIDE, width, n, job->irradiance[k] + (size_t)(y0 + j * n) * g->stride + x0);
+        for (int k = 0; k < 3; k++) {
+            float* row = job->irradiance[k] + (size_t)(y0 + j * n) * g->stride + x0;
+            if (any) es_merge_row(batch->words[k][0] + j * lanes, ES_SHADE_PHASE_STRIDE, width, n, row);
+            else memset(row, 0, width * sizeof *row);
+        }
 }
