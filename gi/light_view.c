@@ -2,6 +2,8 @@
 
 #include "platform/context.h"
 #include "platform/maths.h"
+#include "platform/random.h"
+#include "raster/view_content.h"
 
 enum { LIGHT_PLANES = ES_GBUFFER_DEPTH | ES_GBUFFER_NORMAL | ES_GBUFFER_ALBEDO | ES_GBUFFER_SURFACE };
 
@@ -80,9 +82,12 @@ es_result es_light_view_prepare(es_context* context, es_light_view* view, const 
         if (face->shadow_depth && (!wanted || face->shadow_view.width != sizes.shadow_size)) {
             es_release(context, face->shadow_depth, old_bytes);
             face->shadow_depth = NULL;
+            face->drawn[ES_LIGHT_SHADOW].pose = 0;
         }
-        if (face->gbuffer.memory && (!wanted || !sizes.gbuffers || face->gbuffer.width != sizes.light_size || face->gbuffer.planes != planes))
+        if (face->gbuffer.memory && (!wanted || !sizes.gbuffers || face->gbuffer.width != sizes.light_size || face->gbuffer.planes != planes)) {
             es_gbuffer_destroy(context, &face->gbuffer);
+            face->drawn[ES_LIGHT_GBUFFER].pose = 0;
+        }
         if (!wanted) continue;
         if (!face->shadow_depth) {
             face->shadow_depth = es_allocate(context, (size_t)sizes.shadow_size * sizes.shadow_size * sizeof(float));
@@ -111,26 +116,25 @@ es_result es_light_view_prepare(es_context* context, es_light_view* view, const 
     return ES_OK;
 }
 
-es_result es_light_view_draw_shadow(es_rasterizer* rasterizer, const es_draw_list* list, es_light_view* view, es_raster_stats* stats)
+es_result es_light_view_draw(es_rasterizer* rasterizer, const es_draw_list* list, uint64_t materials, bool keep, es_light_view* view, es_light_drawing what, es_light_drawn* drawn)
 {
     for (uint32_t i = 0; i < view->face_count; i++) {
         es_light_face* face = &view->faces[i];
-        es_raster_stats of_face = {0};
-        es_result result = es_draw_depth(rasterizer, list, &face->shadow_view, face->shadow_depth, face->shadow_view.width, &of_face);
+        const es_raster_view* seen = what == ES_LIGHT_SHADOW ? &face->shadow_view : &face->gbuffer_view;
+        const uint64_t pose = es_hash_bytes(es_view_pose_hash(seen), &materials, sizeof materials) | 1;
+        /* a light that moves is drawn whatever it sees: that is looked at once it stays */
+        const bool stays = keep && face->drawn[what].pose == pose;
+        const uint64_t content = stays ? es_view_content_hash(list, seen) : 0;
+        if (stays && face->drawn[what].has_content && face->drawn[what].content == content) continue;
+        face->drawn[what].pose = 0;
+        es_raster_stats stats = {0};
+        es_result result = what == ES_LIGHT_SHADOW ? es_draw_depth(rasterizer, list, seen, face->shadow_depth, seen->width, &stats) : es_draw_gbuffer(rasterizer, list, seen, &face->gbuffer, &stats);
         if (result) return result;
-        stats->triangles += of_face.triangles;
-    }
-    return ES_OK;
-}
-
-es_result es_light_view_draw_gbuffer(es_rasterizer* rasterizer, const es_draw_list* list, es_light_view* view, es_raster_stats* stats)
-{
-    for (uint32_t i = 0; i < view->face_count; i++) {
-        es_light_face* face = &view->faces[i];
-        es_raster_stats of_face = {0};
-        es_result result = es_draw_gbuffer(rasterizer, list, &face->gbuffer_view, &face->gbuffer, &of_face);
-        if (result) return result;
-        stats->triangles += of_face.triangles;
+        face->drawn[what].pose = pose;
+        face->drawn[what].content = content;
+        face->drawn[what].has_content = stays;
+        drawn->triangles += stats.triangles;
+        drawn->faces++;
     }
     return ES_OK;
 }

@@ -209,6 +209,19 @@ static void reads_light_poses(es_plan* plan, const es_frame_inputs* in)
     }
 }
 
+static es_result draw_light_views(es_renderer* r, const es_frame_inputs* in, es_pass pass, es_light_drawing what)
+{
+    if (!es_plan_run(&r->plan, pass)) return ES_OK;
+    es_light_drawn drawn = {0};
+    es_result result = ES_OK;
+    for (uint32_t i = 0; i < in->light_count && !result; i++)
+        result = es_light_view_draw(r->rasterizer, in->list, in->revisions.materials, r->settings.skip, &r->light_views[i], what, &drawn);
+    if (result) return result;
+    es_plan_done(&r->plan, pass, drawn.triangles);
+    if (!drawn.faces) r->plan.stats[pass].skipped = "nothing moved that the lights see";
+    return ES_OK;
+}
+
 static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
@@ -229,17 +242,8 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_SHADOW_MAPS);
     es_plan_reads(plan, &r->settings.shadow_size, sizeof r->settings.shadow_size);
     reads_light_poses(plan, in);
-    if (es_plan_run(plan, ES_PASS_SHADOW_MAPS)) {
-        uint64_t triangles = 0;
-        for (uint32_t i = 0; i < in->light_count && !result; i++) {
-            es_raster_stats stats = {0};
-            result = es_light_view_draw_shadow(r->rasterizer, in->list, &r->light_views[i], &stats);
-            triangles += stats.triangles;
-        }
-        if (result) return result;
-        es_plan_done(plan, ES_PASS_SHADOW_MAPS, triangles);
-    }
-
+    result = draw_light_views(r, in, ES_PASS_SHADOW_MAPS, ES_LIGHT_SHADOW);
+    if (result) return result;
     if (in->no_indirect) {
         es_plan_not_needed(plan, ES_PASS_LIGHT_VIEWS, in->no_indirect);
         return ES_OK;
@@ -248,16 +252,7 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
     uint32_t words[] = {r->settings.light_size, r->settings.stable_vpls};
     es_plan_reads(plan, words, sizeof words);
     reads_light_poses(plan, in);
-    if (es_plan_run(plan, ES_PASS_LIGHT_VIEWS)) {
-        uint64_t triangles = 0;
-        for (uint32_t i = 0; i < in->light_count && !result; i++) {
-            es_raster_stats stats = {0};
-            result = es_light_view_draw_gbuffer(r->rasterizer, in->list, &r->light_views[i], &stats);
-            triangles += stats.triangles;
-        }
-        if (!result) es_plan_done(plan, ES_PASS_LIGHT_VIEWS, triangles);
-    }
-    return result;
+    return draw_light_views(r, in, ES_PASS_LIGHT_VIEWS, ES_LIGHT_GBUFFER);
 }
 
 /* Of what the lights see. */

@@ -1,7 +1,9 @@
 /* Instances of a view: frustum culling by bounds, matrices in double rounded once, and the cutting into chunks and vertex blocks. */
 #include <string.h>
 
+#include "platform/random.h"
 #include "raster/rasterizer.h"
+#include "raster/view_content.h"
 
 enum { VERTEX_BLOCK = 1024 };
 
@@ -98,6 +100,32 @@ static bool outside(const double window[16], const es_raster_mesh* mesh, uint32_
         all &= out;
     }
     return all != 0;
+}
+
+uint64_t es_view_pose_hash(const es_raster_view* view)
+{
+    const uint32_t words[] = {view->width, view->height, (uint32_t)view->cull};
+    return es_hash_bytes(es_hash_bytes(es_hash_bytes(0, words, sizeof words), &view->view, sizeof view->view), &view->projection, sizeof view->projection);
+}
+
+uint64_t es_view_content_hash(const es_draw_list* list, const es_raster_view* view)
+{
+    double of_view[16], model[16], window[16];
+    uint64_t hash = 0;
+    window_of(of_view, &view->view, &view->projection, view->width, view->height);
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        const es_raster_instance* instance = &list->instances[i];
+        const es_raster_mesh* mesh = instance->mesh;
+        if (!mesh || !mesh->triangle_count || !mesh->vertex_count) continue;
+        rows_of(model, &instance->transform);
+        multiply(window, of_view, model);
+        if (outside(window, mesh, view->width, view->height)) continue;
+        const uint32_t words[] = {instance->id, instance->material};
+        hash = es_hash_bytes(hash, words, sizeof words);
+        hash = es_hash_bytes(hash, &instance->transform, sizeof instance->transform);
+        hash = es_hash_bytes(hash, &mesh->revision, sizeof mesh->revision);
+    }
+    return hash;
 }
 
 static void normal_matrix_of(float out[9], const es_mat4* transform, bool* mirrored)

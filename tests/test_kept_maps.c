@@ -104,11 +104,11 @@ static uint64_t hash_of(stage* s, es_renderer* renderer, const char* name)
     return hash;
 }
 
-static const es_pass_stats* maps_pass(const es_renderer* renderer)
+static const es_pass_stats* pass_of(const es_renderer* renderer, const char* name)
 {
     const es_frame_stats* stats = es_renderer_stats(renderer);
     for (size_t p = 0; p < stats->pass_count; p++)
-        if (strcmp(stats->passes[p].name, "imperfect shadow maps") == 0) return &stats->passes[p];
+        if (strcmp(stats->passes[p].name, name) == 0) return &stats->passes[p];
     fail();
     return NULL;
 }
@@ -132,8 +132,8 @@ static void run(frames* f, uint32_t workers, bool skip, bool stable, uint32_t ke
         assert_int_equal(es_renderer_render(renderer, s.w.world), ES_OK);
         f->ism[frame] = hash_of(&s, renderer, "ism");
         f->indirect[frame] = hash_of(&s, renderer, "indirect");
-        f->count[frame] = maps_pass(renderer)->count;
-        f->skipped[frame] = maps_pass(renderer)->skipped != NULL;
+        f->count[frame] = pass_of(renderer, "imperfect shadow maps")->count;
+        f->skipped[frame] = pass_of(renderer, "imperfect shadow maps")->skipped != NULL;
     }
     es_renderer_destroy(renderer);
     small_world_destroy(&s.w);
@@ -175,8 +175,42 @@ static void test_kept_maps_have_the_same_bits(void** state)
     }
 }
 
+/* A ball beside the lamp's cone: the lamp's views stand. With a second lamp that shines all around, the faces that see the ball are drawn, and no
+ * others. The same bits as when all are. */
+static void test_views_of_lights_stand(void** state)
+{
+    (void)state;
+    stage s = open_stage(2);
+    es_renderer_settings settings[2] = {settings_of(true, true), settings_of(false, true)};
+    es_renderer* renderers[2];
+    for (int i = 0; i < 2; i++) assert_int_equal(es_renderer_create(s.w.context, &settings[i], &renderers[i]), ES_OK);
+    for (int frame = 0; frame < 16; frame++) {
+        set_position(&s, s.ball, es_v3(1.5f - 0.01f * (float)frame, 2.5f, 1.5f));
+        if (frame == 8) {
+            es_light_desc light = es_default_light_desc();
+            light.type = ES_LIGHT_POINT;
+            light.node = node_towards(&s.w, es_v3(-1, 2, 0), es_v3(0, 0, -1));
+            es_light added;
+            assert_int_equal(es_world_add_light(s.w.world, &light, &added), ES_OK);
+        }
+        assert_int_equal(es_world_step(s.w.world, 1.0f / 30), ES_OK);
+        for (int i = 0; i < 2; i++) assert_int_equal(es_renderer_render(renderers[i], s.w.world), ES_OK);
+        if (hash_of(&s, renderers[0], "radiance") != hash_of(&s, renderers[1], "radiance")) fail_msg("frame %d: another picture than when all is drawn", frame);
+        static const char* const names[] = {"shadow maps", "light views"};
+        for (int k = 0; k < 2; k++) {
+            const es_pass_stats *kept = pass_of(renderers[0], names[k]), *all = pass_of(renderers[1], names[k]);
+            assert_true(!all->skipped && all->count > 0);
+            if (frame > 2 && frame < 8) assert_true(kept->skipped && kept->count == 0);
+            if (frame > 10 && !(!kept->skipped && kept->count > 0 && kept->count < all->count))
+                fail_msg("frame %d: %u of %u triangles in the %s", frame, (unsigned)kept->count, (unsigned)all->count, names[k]);
+        }
+    }
+    for (int i = 0; i < 2; i++) es_renderer_destroy(renderers[i]);
+    small_world_destroy(&s.w);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kept_maps_have_the_same_bits)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_kept_maps_have_the_same_bits), cmocka_unit_test(test_views_of_lights_stand)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
