@@ -4,6 +4,9 @@
  * columns, which makes a line of the next pass. So what passes hand each other stays in the caches, and the tests of the geometry that all
  * of them share are made once. */
 #include "gi/filter.h"
+
+#include <string.h>
+
 #include "gi/kernel_table.h"
 #include "gi/lit.h"
 #include "platform/simd.h"
@@ -19,6 +22,8 @@ typedef struct sweep {
     uint32_t x0;                              /* the block's */
     float depth_step, normal_step2;           /* what neighbours may differ by (find_even) */
     uint32_t next[ES_FILTER_MAX_PASSES], end[ES_FILTER_MAX_PASSES]; /* lines that each pass has still to make */
+    /* with six planes: may any of the last three differ from zero in a pass' latest line, and in those of its ring */
+    bool lit[ES_FILTER_MAX_PASSES], lit_mid[ES_FILTER_MAX_PASSES][ES_FILTER_MAX];
 } sweep;
 
 /* Column (or row) i of `count`, which may lie outside by less than n: the place n further in; -1 when that is outside as well. */
@@ -67,12 +72,29 @@ static void fold(const sweep* w, uint32_t p, float* line, float nothing)
     }
 }
 
-static void load_line(const sweep* w, uint32_t y)
+/* Lobes are rare: where planes 3 … 5 of a line's taps are all zero, so are their means. */
+static bool lobes_are_lit(const sweep* w, uint32_t y)
+{
+    const es_filter_job* job = w->job;
+    const es_gbuffer* g = job->gbuffer;
+    const int64_t right = w->left + reads_to(w, 0);
+    const uint32_t begin = w->left > 0 ? (uint32_t)w->left : 0, stop = right < g->stride ? (uint32_t)right : g->stride;
+    if (job->source_lit) return es_lit_within(job->source_lit, es_lit_chunks(g->stride), begin, stop, y, y + 1);
+    const size_t row = (size_t)y * g->stride;
+    vi bits = vi_zero();
+    for (uint32_t k = 3; k < 6; k++)
+        for (uint32_t x = begin; x < stop; x += VW) bits |= vi_load(job->source[k] + row + x);
+    return vm_any(~vi_eq(bits & vi_set1(0x7fffffff), vi_zero()));
+}
+
+static void load_line(sweep* w, uint32_t y)
 {
     const es_gbuffer* g = w->job->gbuffer;
     es_filter_scratch* s = w->s;
     const size_t row = (size_t)y * g->stride;
     const uint32_t line = y & w->ring, to = reads_to(w, 0);
+    w->lit[0] = w->planes == 6 && lobes_are_lit(w, y);
+    const uint32_t planes = w->planes == 6 && !w->lit[0] ? 3 : w->planes;
     /* strides are multiples of eight */
     for (uint32_t at = 0; at < to; at += VW) {
         const int64_t x = w->left + at;
@@ -83,11 +105,11 @@ static void load_line(const sweep* w, uint32_t y)
         vf_store(s->normal[line][0] + at, nx);
         vf_store(s->normal[line][1] + at, ny);
         vf_store(s->normal[line][2] + at, nz);
-        for (uint32_t k = 0; k < w->planes; k++) vf_store(s->in[0][k] + at, vf_load(w->job->source[k] + row + x));
+        for (uint32_t k = 0; k < planes; k++) vf_store(s->in[0][k] + at, vf_load(w->job->source[k] + row + x));
     }
     fold(w, 0, s->depth[line], -1e30f); /* close to no depth */
     for (int k = 0; k < 3; k++) fold(w, 0, s->normal[line][k], 0.0f);
-    for (uint32_t k = 0; k < w->planes; k++) fold(w, 0, s->in[0][k], 0.0f);
+    for (uint32_t k = 0; k < planes; k++) fold(w, 0, s->in[0][k], 0.0f);
     s->depth[line][to] = s->normal[line][0][to] = s->normal[line][1][to] = s->normal[line][2][to] = 0.0f; /* a neighbour of the last, for vectors */
 }
 
@@ -208,53 +230,11 @@ VINL void filter_column(const sweep* w, uint32_t p, uint32_t y, const uint32_t* 
     }
 }
 
-/* Line y of what pass p reads has come: makes the lines whose windows it completes. */
-static void pass_line(sweep* w, uint32_t p, uint32_t y)
+/* A dark line of planes 3 … 5 among lit ones. */
+static void darken_line(const sweep* w, uint32_t p, uint32_t y)
 {
-    const es_filter_job* job = w->job;
-    if (w->planes == 3 && job->size == 8) filter_row(w, p, y, 3, 8);
-    else if (w->planes == 3) filter_row(w, p, y, 3, job->size);
-    else if (w->planes == 6) filter_row(w, p, y, 6, job->size);
-    else filter_row(w, p, y, w->planes, job->size);
-    while (w->next[p] < w->end[p] && end_line(job, w->next[p]) <= y + 1) {
-        const uint32_t made = w->next[p]++;
-        const bool final = p + 1 == job->passes || p + 1 == ES_FILTER_MAX_PASSES;
-        const uint32_t shift = final ? w->margin * job->passes : 0;
-        float* out[6];
-        for (uint32_t k = 0; k < w->planes; k++) out[k] = final ? job->result[k] + ((size_t)made * job->gbuffer->stride + w->x0) : w->s->in[p + 1][k];
-        uint32_t lines[ES_FILTER_MAX], taps = 0;
-        for (uint32_t i = 0; i < job->size; i++) {
-            const int64_t from = folded((int64_t)made - job->size / 2 + i, job->gbuffer->height, job->size);
-            if (from >= 0) lines[taps++] = (uint32_t)from;
-        }
-        if (w->planes == 3 && taps == 8) filter_column(w, p, made, lines, 8, out, shift, 3);
-        else if (w->planes == 3) filter_column(w, p, made, lines, taps, out, shift, 3);
-        else if (w->planes == 6) filter_column(w, p, made, lines, taps, out, shift, 6);
-        else filter_column(w, p, made, lines, taps, out, shift, w->planes);
-        if (final) continue;
-        for (uint32_t k = 0; k < w->planes; k++) fold(w, p + 1, w->s->in[p + 1][k], 0.0f);
-        pass_line(w, p + 1, made);
-    }
-}
-
-/* ---- a block ------------------------------------------------------------------------------------------------------------------ */
-
-/* Lobes are rare: where a block's taps of planes 3 … 5 are all zero, so are their means. */
-static bool lobes_are_dark(const sweep* w, uint32_t first, uint32_t end)
-{
-    const es_filter_job* job = w->job;
-    const es_gbuffer* g = job->gbuffer;
-    const int64_t right = w->left + reads_to(w, 0);
-    const uint32_t begin = w->left > 0 ? (uint32_t)w->left : 0, stop = right < g->stride ? (uint32_t)right : g->stride;
-    if (job->source_lit) return !es_lit_within(job->source_lit, es_lit_chunks(g->stride), begin, stop, first, end);
-    for (uint32_t y = first; y < end; y++) {
-        const size_t row = (size_t)y * g->stride;
-        vi bits = vi_zero();
-        for (uint32_t k = 3; k < 6; k++)
-            for (uint32_t x = begin; x < stop; x += VW) bits |= vi_load(job->source[k] + row + x);
-        if (vm_any(~vi_eq(bits & vi_set1(0x7fffffff), vi_zero()))) return false;
-    }
-    return true;
+    const uint32_t from = makes_from(w, p), to = makes_to(w, p);
+    for (uint32_t k = 3; k < 6; k++) memset(w->s->mid[p][y % ES_FILTER_MAX][k] + from, 0, (to - from) * sizeof(float));
 }
 
 /* Says what a row of the block will be, and returns whether it may have been lit. */
@@ -271,6 +251,59 @@ static bool set_lit(const es_filter_job* job, uint32_t x0, uint32_t y, uint8_t n
     return was;
 }
 _Static_assert((int)ES_FILTER_COLUMNS % (int)ES_LIT_COLUMNS == 0, "blocks share no chunk");
+
+/* Line y of the last pass' planes 3 … 5 is zero. */
+static void darken_result(const sweep* w, uint32_t y)
+{
+    const es_filter_job* job = w->job;
+    if (!set_lit(job, w->x0, y, 0)) return;
+    const uint32_t columns = makes_to(w, job->passes - 1) - makes_from(w, job->passes - 1);
+    for (uint32_t k = 3; k < 6; k++) memset(job->result[k] + (size_t)y * job->gbuffer->stride + w->x0, 0, columns * sizeof(float));
+}
+
+/* Line y of what pass p reads has come: makes the lines whose windows it completes. */
+static void pass_line(sweep* w, uint32_t p, uint32_t y)
+{
+    const es_filter_job* job = w->job;
+    const bool lobes = w->planes == 6;
+    w->lit_mid[p][y % ES_FILTER_MAX] = w->lit[p];
+    if (w->planes == 3 || (lobes && !w->lit[p])) {
+        if (job->size == 8) filter_row(w, p, y, 3, 8);
+        else filter_row(w, p, y, 3, job->size);
+        if (lobes) darken_line(w, p, y);
+    } else if (lobes) filter_row(w, p, y, 6, job->size);
+    else filter_row(w, p, y, w->planes, job->size);
+    while (w->next[p] < w->end[p] && end_line(job, w->next[p]) <= y + 1) {
+        const uint32_t made = w->next[p]++;
+        const bool final = p + 1 == job->passes || p + 1 == ES_FILTER_MAX_PASSES;
+        const uint32_t shift = final ? w->margin * job->passes : 0;
+        float* out[6];
+        for (uint32_t k = 0; k < w->planes; k++) out[k] = final ? job->result[k] + ((size_t)made * job->gbuffer->stride + w->x0) : w->s->in[p + 1][k];
+        uint32_t lines[ES_FILTER_MAX], taps = 0;
+        bool lit = false;
+        for (uint32_t i = 0; i < job->size; i++) {
+            const int64_t from = folded((int64_t)made - job->size / 2 + i, job->gbuffer->height, job->size);
+            if (from < 0) continue;
+            lit |= w->lit_mid[p][from % ES_FILTER_MAX];
+            lines[taps++] = (uint32_t)from;
+        }
+        if (w->planes == 3 || (lobes && !lit)) {
+            if (taps == 8) filter_column(w, p, made, lines, 8, out, shift, 3);
+            else filter_column(w, p, made, lines, taps, out, shift, 3);
+        } else if (lobes) filter_column(w, p, made, lines, taps, out, shift, 6);
+        else filter_column(w, p, made, lines, taps, out, shift, w->planes);
+        if (final) {
+            if (lobes && lit) set_lit(job, w->x0, made, 1);
+            else if (lobes) darken_result(w, made);
+            continue;
+        }
+        w->lit[p + 1] = lit;
+        for (uint32_t k = 0; k < (lobes && !lit ? 3 : w->planes); k++) fold(w, p + 1, w->s->in[p + 1][k], 0.0f);
+        pass_line(w, p + 1, made);
+    }
+}
+
+/* ---- a block ------------------------------------------------------------------------------------------------------------------ */
 
 void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0, es_filter_scratch* s)
 {
@@ -290,16 +323,6 @@ void ES_KERNEL(es_gi_filter)(const es_filter_job* job, uint32_t x0, uint32_t y0,
         first = first_line(job, first);
         end = end_line(job, end - 1);
     }
-    if (w.planes == 6 && lobes_are_dark(&w, first, end)) {
-        w.planes = 3;
-        const uint32_t columns = makes_to(&w, job->passes - 1) - makes_from(&w, job->passes - 1);
-        for (uint32_t y = y0; y < y1; y++) {
-            if (!set_lit(job, x0, y, 0)) continue;
-            for (uint32_t k = 3; k < 6; k++)
-                for (uint32_t x = 0; x < columns; x += VW) vf_store(job->result[k] + (size_t)y * g->stride + x0 + x, vf_zero());
-        }
-    }
-    for (uint32_t y = y0; y < y1 && w.planes == 6; y++) set_lit(job, x0, y, 1);
     for (uint32_t y = first; y < end; y++) {
         load_line(&w, y);
         find_even(&w, y, y == first);
