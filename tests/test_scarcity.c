@@ -475,6 +475,164 @@ static es_result restore(bench* w, const operation* o, void** object)
 
 static void free_object(bench* w, const operation* o, void* object) { free(object); }
 
+/* -- bodies, cloth, a hand and a recording: object: a dynamic, each part of it made again and again until there is memory */
+
+typedef struct dynamic {
+    es_world* world;
+    int stage;
+    es_mesh sheet;
+    es_body floor, box, ball;
+    es_joint joint;
+    es_soft cloth;
+    es_recording* recording;
+} dynamic;
+
+enum { SHEET = 7 };
+
+static es_result add_sheet(es_world* world, es_mesh* mesh)
+{
+    float places[SHEET * SHEET * 3];
+    uint32_t indices[(SHEET - 1) * (SHEET - 1) * 6], *index = indices;
+    for (uint32_t v = 0; v < SHEET * SHEET; v++) {
+        places[3 * v] = 0.15f * (float)(v % SHEET);
+        places[3 * v + 1] = 2;
+        places[3 * v + 2] = 0.15f * (float)(v / SHEET);
+    }
+    for (uint32_t j = 0; j + 1 < SHEET; j++)
+        for (uint32_t i = 0; i + 1 < SHEET; i++) {
+            const uint32_t a = j * SHEET + i, corners[6] = {a, a + SHEET, a + 1, a + 1, a + SHEET, a + SHEET + 1};
+            memcpy(index, corners, sizeof corners);
+            index += 6;
+        }
+    return es_world_add_mesh(world, &(es_mesh_desc){.name = "a sheet", .vertex_count = SHEET * SHEET, .triangle_count = (SHEET - 1) * (SHEET - 1) * 2, .positions = places, .indices = indices}, mesh);
+}
+
+static es_result add_body(es_world* world, es_body_type type, const char* name, es_shape_desc shape, double height, es_body* body)
+{
+    es_body_desc desc = es_default_body_desc();
+    desc.name = name;
+    desc.type = type;
+    desc.shapes = &shape;
+    desc.shape_count = 1;
+    desc.position[1] = height;
+    return es_world_add_body(world, &desc, body);
+}
+
+static es_result dynamic_step(dynamic* d, es_context* context)
+{
+    es_shape_desc shape = es_default_shape_desc();
+    switch (d->stage) {
+    case 0: return es_world_create(context, NULL, &d->world);
+    case 1: return add_sheet(d->world, &d->sheet);
+    case 2: {
+        es_material material;
+        es_instance instance;
+        es_result result = es_world_add_material(d->world, "cloth", &(es_material_desc){.roughness = 1}, &material);
+        return result ? result : es_world_add_instance(d->world, &(es_instance_desc){.mesh = d->sheet, .material = material}, &instance);
+    }
+    case 3: shape.half_extents = es_v3(3, 0.5f, 3); return add_body(d->world, ES_BODY_STATIC, "floor", shape, -0.5, &d->floor);
+    case 4: return add_body(d->world, ES_BODY_DYNAMIC, "box", shape, 0.45, &d->box);
+    case 5: {
+        static const float points[] = {-0.3f, 0, -0.3f, 0.3f, 0, -0.3f, 0, 0, 0.4f, 0, 0.5f, 0};
+        shape.type = ES_SHAPE_HULL;
+        shape.points = points;
+        shape.point_count = 4;
+        return add_body(d->world, ES_BODY_DYNAMIC, "hull", shape, 1.2, &d->ball);
+    }
+    case 6: {
+        es_joint_desc desc = es_default_joint_desc();
+        desc.name = "joint";
+        desc.a = d->box;
+        desc.b = d->ball;
+        return es_world_add_joint(d->world, &desc, &d->joint);
+    }
+    case 7: {
+        const es_soft_attachment held[] = {{.vertex = 0, .in_place = true}, {.vertex = SHEET - 1, .in_place = true}, {.vertex = SHEET * SHEET - 1, .in_place = true}};
+        es_soft_desc desc = es_default_soft_desc();
+        desc.name = "sheet";
+        desc.mesh = d->sheet;
+        desc.tear_stretch = 3;
+        desc.self_collision = true;
+        desc.drag = 0.1f;
+        desc.attachments = held;
+        desc.attachment_count = 3;
+        return es_world_add_soft(d->world, &desc, &d->cloth);
+    }
+    case 8: return es_world_grab_body(d->world, 0, d->box, es_v3(0.1f, 0.2f, 0), (const double[3]){0.2, 1, 0}, 100);
+    default: return es_recording_begin(d->world, "a scene", "settings", &d->recording);
+    }
+}
+
+enum { TEAR = 1, LET_GO, LET_ALL_GO, HOLD, SOFTEN, STEP, RECORDED };
+
+static es_result make_dynamic(bench* w, const operation* o, void** object)
+{
+    dynamic* d = *object ? *object : calloc(1, sizeof *d);
+    *object = d;
+    /* a recording has failures of its own, of which it says that it goes no further: what fails otherwise is not recorded */
+    for (const int stages = o->kind == 0 || o->kind == RECORDED ? 10 : 9; d->stage < stages; d->stage++) {
+        es_result result = dynamic_step(d, w->context);
+        if (result) return result;
+    }
+    return ES_OK;
+}
+
+static void dynamic_destroy(bench* w, const operation* o, void* object)
+{
+    dynamic* d = object;
+    if (!d) return;
+    if (d->recording) es_recording_end(d->recording);
+    es_recording_destroy(d->recording);
+    es_world_destroy(d->world);
+    free(d);
+}
+
+/* A hundred milliseconds on, all that is allocated for a step is there. */
+static es_result dynamic_moving(bench* w, const operation* o, void** object)
+{
+    es_result result = make_dynamic(w, o, object);
+    return result ? result : es_world_step(((dynamic*)*object)->world, 0.1f);
+}
+
+static es_result dynamic_change(bench* w, const operation* o, void** object)
+{
+    dynamic* d = *object;
+    switch (o->kind) {
+    case TEAR: return es_world_soft_tear(d->world, d->cloth, (const double[3]){0.45, 2, 0.45}, 0.3f);
+    case LET_GO: return es_world_soft_detach(d->world, d->cloth, SHEET - 1);
+    case LET_ALL_GO: return es_world_soft_detach(d->world, d->cloth, ES_SOFT_ALL);
+    case HOLD: return es_world_soft_attach(d->world, d->cloth, &(es_soft_attachment){.vertex = 3 * SHEET, .in_place = true});
+    case SOFTEN: {
+        es_soft_desc desc;
+        assert_int_equal(es_world_get_soft(d->world, d->cloth, &desc), ES_OK);
+        desc.stretch_compliance = 1e-5f;
+        return es_world_set_soft(d->world, d->cloth, &desc);
+    }
+    case RECORDED: return es_recording_save(d->recording, path_of(o->file));
+    default: return es_world_step(d->world, 0.1f);
+    }
+}
+
+static uint64_t dynamic_hash(bench* w, const operation* o, void* object)
+{
+    dynamic* d = object;
+    if (o->kind == 0) return content_hash(d->world); /* a handle that was taken back has another generation */
+    if (o->kind == RECORDED) return hash_of_file(path_of(o->file));
+    if (o->kind == STEP) { /* what failed has taken its time: it is another step that succeeds, of a world that is still one */
+        double place[3];
+        es_body_state body;
+        for (uint32_t v = 0; v < SHEET * SHEET; v++) {
+            assert_int_equal(es_world_get_soft_vertex(d->world, d->cloth, v, place, NULL), ES_OK);
+            for (int k = 0; k < 3; k++) assert_true(place[k] > -10 && place[k] < 10);
+        }
+        assert_int_equal(es_world_get_body(d->world, d->box, &body), ES_OK);
+        assert_true(body.position[1] > -0.1 && body.position[1] < 2);
+        assert_int_equal(es_world_step(d->world, 0.1f), ES_OK);
+        return 1;
+    }
+    return es_world_hash(d->world) ^ content_hash(d->world);
+}
+
 /* -- frames: object: an es_renderer */
 
 static void renderer_destroy(bench* w, const operation* o, void* object) { es_renderer_destroy(object); }
@@ -651,6 +809,14 @@ static const operation operations[] = {
     {"room", 0, NULL, scene, world_hash, world_destroy, "room"},
     {"hall", 0, NULL, scene, world_hash, world_destroy, "hall"},
     {"make a world", 0, NULL, make, make_hash, make_destroy},
+    {"make bodies and cloth", 0, NULL, make_dynamic, dynamic_hash, dynamic_destroy},
+    {"step, the first", 0, make_dynamic, dynamic_change, dynamic_hash, dynamic_destroy, NULL, STEP},
+    {"tear a cloth", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, TEAR},
+    {"let go of a vertex", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, LET_GO},
+    {"let go of all", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, LET_ALL_GO},
+    {"hold a vertex", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, HOLD},
+    {"soften a cloth", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, SOFTEN},
+    {"save a recording", 0, make_dynamic, dynamic_change, dynamic_hash, dynamic_destroy, "out.hdr", RECORDED},
     {"deform a mesh", WORLD, NULL, deform, bench_hash, NULL},
     {"set an environment", WORLD | IMAGES, NULL, environment, environment_hash, NULL},
     {"restore a world", WORLD, restore_prepare, restore, bench_hash, free_object},

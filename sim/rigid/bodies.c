@@ -159,6 +159,7 @@ static bool make_shapes(es_world* world, const es_body_desc* desc, const char* n
     body->proxies = es_allocate_array(context, desc->shape_count, sizeof *body->proxies);
     if (!body->proxies) {
         es_release(context, body->shapes, desc->shape_count * sizeof *body->shapes);
+        body->shapes = NULL;
         return false;
     }
     body->shape_count = desc->shape_count;

@@ -167,6 +167,14 @@ typedef struct es_soft_object {
     bool posed;                    /* and is still so */
 } es_soft_object;
 
+/* One of several arrays of an arena that its maker frees when any is missing: the first that finds no memory says so, and no more is asked for. */
+static inline void* es_soft_room(es_arena* arena, size_t count, size_t size)
+{
+    void* memory = arena->block_size ? es_arena_allocate(arena, (count ? count : 1) * size) : NULL;
+    if (!memory) arena->block_size = 0;
+    return memory;
+}
+
 /* soft_welding.c: particles, corners, masses or tetrahedra's bindings from the mesh and the desc; false after es_fail */
 bool es_soft_weld(es_world* world, es_soft_object* soft, const es_mesh_object* mesh);
 bool es_soft_embed(es_world* world, es_soft_object* soft, const es_mesh_object* mesh, const es_soft_solid* solid);

@@ -12,8 +12,6 @@
 #include "platform/maths.h"
 #include "sim/rigid/rigid.h"
 
-static void* room(es_arena* arena, size_t count, size_t size) { return es_arena_allocate(arena, (count ? count : 1) * size); }
-
 es_vec3 es_soft_hold_place(const es_world* world, const es_soft_object* soft, const es_soft_hold* hold)
 {
     const es_vec3 l = hold->local;
@@ -91,9 +89,9 @@ static bool reach_out(es_soft_object* soft, es_soft_anchors* anchors, es_arena* 
 {
     const es_soft_layout* layout = &soft->layout;
     const size_t lanes = (size_t)layout->link_count * 8, slots = layout->slot_count;
-    uint32_t *first = room(scratch, slots + 2, sizeof *first), *next = room(scratch, 2 * lanes, sizeof *next);
-    float* length = room(scratch, 2 * lanes, sizeof *length);
-    arrival* heap = room(scratch, 4 * lanes + soft->hold_count, sizeof *heap);
+    uint32_t *first = es_soft_room(scratch, slots + 2, sizeof *first), *next = es_soft_room(scratch, 2 * lanes, sizeof *next);
+    float* length = es_soft_room(scratch, 2 * lanes, sizeof *length);
+    arrival* heap = es_soft_room(scratch, 4 * lanes + soft->hold_count, sizeof *heap);
     if (!first || !next || !length || !heap) return false;
     memset(first, 0, (slots + 2) * sizeof *first);
     for (int pass = 0; pass < 2; pass++) {
@@ -146,8 +144,8 @@ bool es_soft_make_anchors(es_context* context, es_soft_object* soft)
     es_arena_init(&scratch, context, 1 << 16);
     bool good = true;
     const size_t ends = 4 * ((size_t)soft->hold_count + ES_HANDS);
-    anchors.start = room(&anchors.arena, ends, sizeof(float));
-    anchors.end = room(&anchors.arena, ends, sizeof(float));
+    anchors.start = es_soft_room(&anchors.arena, ends, sizeof(float));
+    anchors.end = es_soft_room(&anchors.arena, ends, sizeof(float));
     good = anchors.start && anchors.end;
     if (good) {
         memset(anchors.start, 0, ends * sizeof(float));
@@ -155,8 +153,8 @@ bool es_soft_make_anchors(es_context* context, es_soft_object* soft)
     }
     bool wanted = soft->tetrahedron_count == 0 && soft->desc.stretch_compliance == 0 && soft->hold_count > 0;
     for (int k = 0; k < 2 && good && wanted; k++) {
-        anchors.index[k] = room(&anchors.arena, layout->slot_count, sizeof(uint32_t));
-        anchors.reach[k] = room(&anchors.arena, layout->slot_count, sizeof(float));
+        anchors.index[k] = es_soft_room(&anchors.arena, layout->slot_count, sizeof(uint32_t));
+        anchors.reach[k] = es_soft_room(&anchors.arena, layout->slot_count, sizeof(float));
         good = anchors.index[k] && anchors.reach[k];
         if (good) memset(anchors.index[k], 0xff, layout->slot_count * sizeof(uint32_t));
     }

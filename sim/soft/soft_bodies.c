@@ -7,7 +7,6 @@
 #include "platform/maths.h"
 #include "sim/rigid/hands.h"
 
-static void* room(es_arena* arena, size_t count, size_t size) { return es_arena_allocate(arena, (count ? count : 1) * size); }
 static const char* label(const char* name) { return name ? name : ""; }
 
 es_soft_desc es_default_soft_desc(void)
@@ -134,14 +133,13 @@ static bool fill(es_world* world, es_soft_object* soft, es_mesh_object* mesh, co
     es_context* context = world->context;
     const bool tears = !desc->solid && soft->desc.tearable;
     soft->first_vertices = soft->vertex_used = mesh->raster.vertex_count;
-    if (tears && !es_mesh_reserve(world, mesh, mesh->raster.vertex_count + 64)) return false;
-    soft->vertex_count = mesh->raster.vertex_count;
+    soft->vertex_count = mesh->raster.vertex_count + (tears ? mesh->raster.vertex_count + 64 : 0); /* reserved when all else is there */
     soft->weld = NULL;
     memcpy(soft->origin, es_node_position(world, desc->node), sizeof soft->origin);
     if (!(desc->solid ? es_soft_embed(world, soft, mesh, desc->solid) : es_soft_weld(world, soft, mesh))) return false;
     if (!desc->solid) {
-        soft->parent = room(&soft->arena, soft->particle_room - soft->first_particles, sizeof *soft->parent);
-        soft->weld = room(&soft->arena, soft->vertex_count, sizeof *soft->weld);
+        soft->parent = es_soft_room(&soft->arena, soft->particle_room - soft->first_particles, sizeof *soft->parent);
+        soft->weld = es_soft_room(&soft->arena, soft->vertex_count, sizeof *soft->weld);
         if (!soft->parent || !soft->weld || !es_soft_make_mesh_fans(world, soft, mesh)) return false;
     }
     if (!es_soft_lay_out(context, soft, NULL)) return false;
@@ -176,6 +174,8 @@ es_result es_world_add_soft(es_world* world, const es_soft_desc* desc, es_soft* 
     if (!good) result = es_context_last_result(world->context);
     for (uint32_t i = 0; i < desc->attachment_count && result == ES_OK; i++) result = add_hold(world, soft, &desc->attachments[i]);
     if (result == ES_OK && !es_soft_make_anchors(world->context, soft)) result = es_context_last_result(world->context);
+    const uint32_t reserve = soft->vertex_count - mesh->raster.vertex_count;
+    if (result == ES_OK && reserve && !es_mesh_reserve(world, mesh, reserve)) result = es_context_last_result(world->context);
     es_fp_leave(environment);
     if (result != ES_OK) {
         es_soft_free(world, soft);

@@ -29,8 +29,6 @@ typedef struct builder {
     uint32_t* band;                /* per particle */
 } builder;
 
-static void* room(es_arena* arena, size_t count, size_t size) { return es_arena_allocate(arena, (count ? count : 1) * size); }
-
 static float rest_distance(const es_soft_object* soft, uint32_t a, uint32_t b)
 {
     const float *p = soft->rest + 3 * (size_t)a, *q = soft->rest + 3 * (size_t)b;
@@ -46,8 +44,8 @@ typedef struct half_edge { uint32_t high, opposite; } half_edge;
 static bool sort_edges(const builder* b, const uint32_t* corners, uint32_t count, uint32_t sides, uint32_t** first_out, half_edge** edges_out)
 {
     static const uint8_t pairs[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
-    uint32_t* first = room(b->scratch, (size_t)b->particles + 2, sizeof *first);
-    half_edge* edges = room(b->scratch, (size_t)count * (sides == 3 ? 3 : 6), sizeof *edges);
+    uint32_t* first = es_soft_room(b->scratch, (size_t)b->particles + 2, sizeof *first);
+    half_edge* edges = es_soft_room(b->scratch, (size_t)count * (sides == 3 ? 3 : 6), sizeof *edges);
     if (!first || !edges) return false;
     memset(first, 0, ((size_t)b->particles + 2) * sizeof *first);
     const uint32_t edge_count = sides == 3 ? 3 : 6;
@@ -98,7 +96,7 @@ static bool make_links(builder* b)
     half_edge* edges;
     if (!sort_edges(b, cloth ? soft->corners : soft->tetrahedra, cloth ? soft->triangle_count : soft->tetrahedron_count, cloth ? 3 : 4, &first, &edges)) return false;
     const uint32_t total = first[b->particles];
-    b->links = room(b->scratch, 2 * (size_t)total, sizeof *b->links);
+    b->links = es_soft_room(b->scratch, 2 * (size_t)total, sizeof *b->links);
     if (!b->links) return false;
     for (uint32_t p = 0; p < b->particles; p++)
         for (uint32_t i = first[p], end = i; i < first[p + 1]; i = end) {
@@ -120,8 +118,8 @@ static bool make_links(builder* b)
 
 static bool make_graph(builder* b)
 {
-    b->first = room(b->scratch, (size_t)b->particles + 2, sizeof *b->first);
-    b->next = room(b->scratch, 2 * b->link_count, sizeof *b->next);
+    b->first = es_soft_room(b->scratch, (size_t)b->particles + 2, sizeof *b->first);
+    b->next = es_soft_room(b->scratch, 2 * b->link_count, sizeof *b->next);
     if (!b->first || !b->next) return false;
     memset(b->first, 0, ((size_t)b->particles + 2) * sizeof *b->first);
     for (size_t i = 0; i < b->link_count; i++) {
@@ -153,9 +151,9 @@ static uint32_t flood(const builder* b, uint32_t from, uint32_t* level, uint32_t
 
 static bool make_bands(builder* b, es_soft_layout* layout)
 {
-    b->level = room(b->scratch, b->particles, sizeof *b->level);
-    b->band = room(b->scratch, b->particles, sizeof *b->band);
-    uint32_t* queue = room(b->scratch, b->particles, sizeof *queue);
+    b->level = es_soft_room(b->scratch, b->particles, sizeof *b->level);
+    b->band = es_soft_room(b->scratch, b->particles, sizeof *b->band);
+    uint32_t* queue = es_soft_room(b->scratch, b->particles, sizeof *queue);
     if (!b->level || !b->band || !queue) return false;
     for (uint32_t p = 0; p < b->particles; p++) b->level[p] = ES_SOFT_NONE;
     uint32_t levels = 1;
@@ -166,7 +164,7 @@ static bool make_bands(builder* b, es_soft_layout* layout)
         flood(b, far, b->level, queue);
         if (b->level[queue[count - 1]] >= levels) levels = b->level[queue[count - 1]] + 1;
     }
-    uint32_t *size = room(b->scratch, levels, sizeof *size), *band_of = room(b->scratch, levels, sizeof *band_of);
+    uint32_t *size = es_soft_room(b->scratch, levels, sizeof *size), *band_of = es_soft_room(b->scratch, levels, sizeof *band_of);
     if (!size || !band_of) return false;
     memset(size, 0, levels * sizeof *size);
     for (uint32_t p = 0; p < b->particles; p++) size[b->level[p]]++;
@@ -186,8 +184,8 @@ static bool make_bands(builder* b, es_soft_layout* layout)
         else bands++;
     }
     layout->band_count = bands ? bands : 1;
-    layout->bands = room(&layout->arena, layout->band_count, sizeof *layout->bands);
-    layout->slot_of = room(&layout->arena, b->particles, sizeof *layout->slot_of);
+    layout->bands = es_soft_room(&layout->arena, layout->band_count, sizeof *layout->bands);
+    layout->slot_of = es_soft_room(&layout->arena, b->particles, sizeof *layout->slot_of);
     if (!layout->bands || !layout->slot_of) return false;
     memset(layout->bands, 0, layout->band_count * sizeof *layout->bands);
     for (uint32_t p = 0; p < b->particles; p++) {
@@ -201,7 +199,7 @@ static bool make_bands(builder* b, es_soft_layout* layout)
         slots += (count + 7) / 8 * 8;
     }
     layout->slot_count = slots;
-    layout->particle_of = room(&layout->arena, slots, sizeof *layout->particle_of);
+    layout->particle_of = es_soft_room(&layout->arena, slots, sizeof *layout->particle_of);
     if (!layout->particle_of) return false;
     for (uint32_t s = 0; s < slots; s++) layout->particle_of[s] = ES_SOFT_NONE;
     for (uint32_t p = 0; p < b->particles; p++) {
@@ -220,8 +218,8 @@ static bool make_bands(builder* b, es_soft_layout* layout)
 static uint32_t* sort_by_colour(const builder* b, uint32_t bands, const uint32_t* ends, uint32_t corners, size_t count, uint32_t** starts_out)
 {
     const size_t groups = (size_t)bands * 2 * (COLOURS + 1);
-    uint64_t* used[2] = {room(b->scratch, b->particles, sizeof **used), room(b->scratch, b->particles, sizeof **used)};
-    uint32_t *group = room(b->scratch, count, sizeof *group), *starts = room(b->scratch, groups + 2, sizeof *starts), *order = room(b->scratch, count, sizeof *order);
+    uint64_t* used[2] = {es_soft_room(b->scratch, b->particles, sizeof **used), es_soft_room(b->scratch, b->particles, sizeof **used)};
+    uint32_t *group = es_soft_room(b->scratch, count, sizeof *group), *starts = es_soft_room(b->scratch, groups + 2, sizeof *starts), *order = es_soft_room(b->scratch, count, sizeof *order);
     if (!used[0] || !used[1] || !group || !starts || !order) return NULL;
     memset(used[0], 0, b->particles * sizeof **used);
     memset(used[1], 0, b->particles * sizeof **used);
@@ -278,7 +276,7 @@ static uint32_t next_batch(const uint32_t* starts, size_t* group, uint32_t* at)
 
 static bool make_link_batches(const builder* b, es_soft_layout* layout)
 {
-    uint32_t *ends = room(b->scratch, 2 * b->link_count, sizeof *ends), *starts = NULL;
+    uint32_t *ends = es_soft_room(b->scratch, 2 * b->link_count, sizeof *ends), *starts = NULL;
     if (!ends) return false;
     for (size_t i = 0; i < b->link_count; i++) {
         ends[2 * i] = b->links[i].a;
@@ -287,9 +285,9 @@ static bool make_link_batches(const builder* b, es_soft_layout* layout)
     const uint32_t* order = sort_by_colour(b, layout->band_count, ends, 2, b->link_count, &starts);
     if (!order) return false;
     layout->link_count = count_batches(starts, layout->bands, layout->band_count, false);
-    layout->links = room(&layout->arena, layout->link_count, sizeof *layout->links);
-    layout->kinds = room(&layout->arena, (size_t)layout->link_count * 8, 1);
-    layout->edges = room(&layout->arena, (size_t)layout->link_count * 8, 1);
+    layout->links = es_soft_room(&layout->arena, layout->link_count, sizeof *layout->links);
+    layout->kinds = es_soft_room(&layout->arena, (size_t)layout->link_count * 8, 1);
+    layout->edges = es_soft_room(&layout->arena, (size_t)layout->link_count * 8, 1);
     if (!layout->links || !layout->kinds || !layout->edges) return false;
     size_t group = 0;
     uint32_t at = 0;
@@ -336,7 +334,7 @@ static bool make_volume_batches(const builder* b, es_soft_layout* layout)
     const uint32_t* order = sort_by_colour(b, layout->band_count, soft->tetrahedra, 4, soft->tetrahedron_count, &starts);
     if (!order) return false;
     layout->volume_count = count_batches(starts, layout->bands, layout->band_count, true);
-    layout->volumes = room(&layout->arena, layout->volume_count, sizeof *layout->volumes);
+    layout->volumes = es_soft_room(&layout->arena, layout->volume_count, sizeof *layout->volumes);
     if (!layout->volumes) return false;
     size_t group = 0;
     uint32_t at = 0;
@@ -357,7 +355,7 @@ static bool make_volume_batches(const builder* b, es_soft_layout* layout)
 
 static bool make_triangles(const es_soft_object* soft, es_soft_layout* layout, es_context* context)
 {
-    layout->indices = room(&layout->arena, 3 * (size_t)soft->triangle_count, sizeof *layout->indices);
+    layout->indices = es_soft_room(&layout->arena, 3 * (size_t)soft->triangle_count, sizeof *layout->indices);
     if (!layout->indices) return false;
     for (uint32_t t = 0; t < soft->triangle_count; t++) {
         const uint32_t* c = soft->corners + 3 * (size_t)t;
@@ -399,11 +397,11 @@ bool es_soft_lay_out(es_context* context, es_soft_object* soft, es_soft_layout* 
     es_arena_free(&scratch);
     float* streams[5] = {0};
     for (int k = 0; k < 5 && good; k++) {
-        streams[k] = room(&layout.arena, 4 * (size_t)layout.slot_count, sizeof(float));
+        streams[k] = es_soft_room(&layout.arena, 4 * (size_t)layout.slot_count, sizeof(float));
         good = streams[k] != NULL;
         if (good) memset(streams[k], 0, 4 * (size_t)layout.slot_count * sizeof(float));
     }
-    float* ratio = good ? room(&layout.arena, 8 * (size_t)layout.link_count, sizeof(float)) : NULL;
+    float* ratio = good ? es_soft_room(&layout.arena, 8 * (size_t)layout.link_count, sizeof(float)) : NULL;
     if (!ratio) {
         es_soft_layout_free(&layout);
         return false;

@@ -134,7 +134,7 @@ typedef struct torn_mesh { es_arena arena; uint32_t *indices, *particle_at, *sou
 
 static void* copy_of(es_arena* arena, const void* from, size_t bytes)
 {
-    void* copy = es_arena_allocate(arena, bytes ? bytes : 1);
+    void* copy = es_soft_room(arena, bytes, 1);
     if (copy) memcpy(copy, from, bytes);
     return copy;
 }
@@ -184,8 +184,8 @@ static bool make_torn_mesh(es_world* world, const es_soft_object* soft, const es
     m->indices = copy_of(&m->arena, mesh->indices, 3 * (size_t)mesh->raster.triangle_count * sizeof *m->indices);
     m->particle_at = copy_of(&m->arena, soft->particle_at, vertices);
     m->source = copy_of(&m->arena, soft->vertex_source, vertices);
-    m->weld = es_arena_allocate(&m->arena, vertices);
-    uint32_t *chain = es_arena_allocate(&m->arena, vertices), *first = es_arena_allocate(&m->arena, particles); /* vertex, or its copies: the next copy */
+    m->weld = es_soft_room(&m->arena, vertices, 1);
+    uint32_t *chain = es_soft_room(&m->arena, vertices, 1), *first = es_soft_room(&m->arena, particles, 1); /* vertex, or its copies: the next copy */
     bool good = m->indices && m->particle_at && m->source && m->weld && chain && first;
     if (good) {
         memset(chain, 0xff, vertices);

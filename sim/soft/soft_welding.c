@@ -6,12 +6,10 @@
 #include "platform/maths.h"
 #include "platform/random.h"
 
-static void* room(es_arena* arena, size_t count, size_t size) { return es_arena_allocate(arena, (count ? count : 1) * size); }
-
 /* Per vertex the first one at the same place, to the bit (-0 counts as 0). */
 static uint32_t* find_welds(es_arena* arena, es_context* context, const float* positions, uint32_t count)
 {
-    uint32_t* weld = room(arena, count, sizeof *weld);
+    uint32_t* weld = es_soft_room(arena, count, sizeof *weld);
     size_t size = 16;
     while (size < 2 * (size_t)count) size *= 2;
     uint32_t* table = weld ? es_allocate(context, size * sizeof *table) : NULL;
@@ -114,10 +112,10 @@ bool es_soft_weld(es_world* world, es_soft_object* soft, const es_mesh_object* m
     uint32_t* weld = find_welds(arena, context, mesh->positions, vertices);
     if (!weld) return false;
     soft->triangle_count = triangles;
-    soft->corners = room(arena, 3 * (size_t)triangles, sizeof *soft->corners);
-    soft->mesh_indices = room(arena, 3 * (size_t)triangles, sizeof *soft->mesh_indices);
-    soft->particle_at = room(arena, soft->vertex_count, sizeof *soft->particle_at);
-    soft->vertex_source = room(arena, soft->vertex_count, sizeof *soft->vertex_source);
+    soft->corners = es_soft_room(arena, 3 * (size_t)triangles, sizeof *soft->corners);
+    soft->mesh_indices = es_soft_room(arena, 3 * (size_t)triangles, sizeof *soft->mesh_indices);
+    soft->particle_at = es_soft_room(arena, soft->vertex_count, sizeof *soft->particle_at);
+    soft->vertex_source = es_soft_room(arena, soft->vertex_count, sizeof *soft->vertex_source);
     if (!soft->corners || !soft->mesh_indices || !soft->particle_at || !soft->vertex_source) return false;
     memcpy(soft->mesh_indices, mesh->indices, 3 * (size_t)triangles * sizeof(uint32_t));
     /* vertices that no triangle has are no particles: nothing would hold them */
@@ -130,10 +128,10 @@ bool es_soft_weld(es_world* world, es_soft_object* soft, const es_mesh_object* m
         if (weld[v] != v) soft->particle_at[v] = soft->particle_at[weld[v]];
     soft->particle_count = soft->first_particles = particles;
     soft->particle_room = particles + (soft->vertex_count - vertices);
-    soft->rest = room(arena, 3 * (size_t)soft->particle_room, sizeof(float));
-    soft->mass = room(arena, soft->particle_room, sizeof(float));
-    soft->first_vertex = room(arena, soft->particle_room, sizeof(uint32_t));
-    soft->first_mass = room(arena, particles, sizeof(float));
+    soft->rest = es_soft_room(arena, 3 * (size_t)soft->particle_room, sizeof(float));
+    soft->mass = es_soft_room(arena, soft->particle_room, sizeof(float));
+    soft->first_vertex = es_soft_room(arena, soft->particle_room, sizeof(uint32_t));
+    soft->first_mass = es_soft_room(arena, particles, sizeof(float));
     if (!soft->rest || !soft->mass || !soft->first_vertex || !soft->first_mass) return false;
     for (uint32_t v = vertices; v-- > 0;) {
         soft->vertex_source[v] = v;
@@ -271,11 +269,11 @@ bool es_soft_embed(es_world* world, es_soft_object* soft, const es_mesh_object* 
     const es_mat4* matrix = es_node_world(world, soft->desc.node);
     soft->particle_count = soft->first_particles = soft->particle_room = solid->particle_count;
     soft->tetrahedron_count = solid->tetrahedron_count;
-    soft->rest = room(arena, 3 * (size_t)solid->particle_count, sizeof(float));
-    soft->mass = room(arena, solid->particle_count, sizeof(float));
-    soft->tetrahedra = room(arena, 4 * (size_t)solid->tetrahedron_count, sizeof(uint32_t));
-    soft->inside = room(arena, soft->vertex_count, sizeof(uint32_t));
-    soft->weights = room(arena, 4 * (size_t)soft->vertex_count, sizeof(float));
+    soft->rest = es_soft_room(arena, 3 * (size_t)solid->particle_count, sizeof(float));
+    soft->mass = es_soft_room(arena, solid->particle_count, sizeof(float));
+    soft->tetrahedra = es_soft_room(arena, 4 * (size_t)solid->tetrahedron_count, sizeof(uint32_t));
+    soft->inside = es_soft_room(arena, soft->vertex_count, sizeof(uint32_t));
+    soft->weights = es_soft_room(arena, 4 * (size_t)soft->vertex_count, sizeof(float));
     soft->weld = find_welds(arena, context, mesh->positions, soft->vertex_count);
     if (!soft->rest || !soft->mass || !soft->tetrahedra || !soft->inside || !soft->weights || !soft->weld) return false;
     for (uint32_t p = 0; p < solid->particle_count; p++) to_rest(matrix, solid->particles + 3 * (size_t)p, soft->rest + 3 * (size_t)p);
