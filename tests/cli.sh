@@ -436,5 +436,13 @@ for word in ('compiler', 'commit', 'threads', 'instruction set', 'UTC'):
 PYTHON
 fi
 
+# ---- soak ---------------------------------------------------------------------------------------------------------------
+expect 0 soak --scene cornell-stack --seconds 2 --threads 1
+says '^cornell-stack +17 bodies +0 soft bodies, 2 s, .*: good$'
+expect 0 soak --scene curtain --seconds 0.5 --threads 2
+says '^curtain .* [1-9][0-9]* soft bod.*: good$'
+refused "no built-in scene is named 'nope'" soak --scene nope
+refused --seconds soak --seconds -1
+
 echo "$checks checks, $failures failed"
 [ $failures -eq 0 ]

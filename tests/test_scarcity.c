@@ -637,11 +637,21 @@ static uint64_t dynamic_hash(bench* w, const operation* o, void* object)
 
 static void renderer_destroy(bench* w, const operation* o, void* object) { es_renderer_destroy(object); }
 
+/* Kinds beyond the methods: light that is kept in time, with three bounces by the one-pass method or by reflective maps. */
+enum { IN_TIME = 6 };
+
 static es_result frame(bench* w, const operation* o, void** object)
 {
     es_renderer_settings settings = small_settings();
-    settings.method = (uint32_t)(o->kind < 4 ? o->kind : ES_GI_VPL_TRACED);
-    settings.traced_bias = (uint32_t)(o->kind < 4 ? 0 : o->kind - 3);
+    settings.method = (uint32_t)(o->kind < 4 ? o->kind : o->kind < IN_TIME ? ES_GI_VPL_TRACED : ES_GI_ISM);
+    settings.traced_bias = (uint32_t)(o->kind < 4 || o->kind >= IN_TIME ? 0 : o->kind - 3);
+    if (o->kind >= IN_TIME) {
+        settings.temporal = settings.stable_vpls = true;
+        settings.antialias = ES_ANTIALIAS_TEMPORAL;
+        settings.bounces = 3;
+        settings.bounce_vpls = 8;
+        settings.bounce_method = o->kind == IN_TIME ? ES_BOUNCE_ONE_PASS : ES_BOUNCE_REFLECTIVE;
+    }
     es_renderer* renderer = *object;
     es_result result = renderer ? ES_OK : es_renderer_create(w->context, &settings, &renderer);
     assert_true(!result == (renderer != NULL));
@@ -826,6 +836,9 @@ static const operation operations[] = {
     {"frame, vpl-traced", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_VPL_TRACED},
     {"frame, unbounded", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, 4},
     {"frame, compensated", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, 5},
+    {"frame, in time", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, IN_TIME},
+    {"frame, reflective", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, IN_TIME + 1},
+    {"next frame, in time", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, IN_TIME},
     {"next frame, ism", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, ES_GI_ISM},
     {"next frame, compensated", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, 5},
     {"images of a frame", WORLD | RENDERER, NULL, images, result_hash, NULL},
