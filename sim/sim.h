@@ -108,7 +108,8 @@ typedef void (*es_world_step_function)(es_world* world, void* user, double time,
 ES_API void es_world_set_step_function(es_world* world, es_world_step_function function, void* user);
 
 /* The state that moves (time, node transforms now and last, lights, cameras, deformed meshes), not the assets. NULL buffer: *size is set.
- * Restoring needs the same world content; a buffer that does not fit is refused. */
+ * Restoring needs the same world content; a buffer that does not fit is refused, and so is one there is no memory for, with the world as it
+ * was. Only a torn cloth finds out half-way: ES_OUT_OF_MEMORY then leaves a world that is neither, to be restored again or destroyed. */
 ES_API es_result es_world_save(const es_world* world, void* buffer, size_t* size);
 ES_API es_result es_world_restore(es_world* world, const void* buffer, size_t size);
 ES_API uint64_t es_world_hash(const es_world* world); /* of the saved state */

@@ -370,6 +370,7 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     world->revisions.steps += 2;
     es_world_refresh(world);
     es_recording_resume(world, recording);
+    if (!io.good) return es_context_last_result(context);
     if (recording) es_note(world, &(es_input){.type = ES_INPUT_RESTORE, .state = {buffer, size}});
     return ES_OK;
 }

@@ -485,6 +485,7 @@ typedef struct dynamic {
     es_joint joint;
     es_soft cloth;
     es_recording* recording;
+    saved* state;
 } dynamic;
 
 enum { SHEET = 7 };
@@ -563,7 +564,7 @@ static es_result dynamic_step(dynamic* d, es_context* context)
     }
 }
 
-enum { TEAR = 1, LET_GO, LET_ALL_GO, HOLD, SOFTEN, STEP, RECORDED };
+enum { TEAR = 1, LET_GO, LET_ALL_GO, HOLD, SOFTEN, STEP, RECORDED, TO_TORN, TO_WHOLE };
 
 static es_result make_dynamic(bench* w, const operation* o, void** object)
 {
@@ -584,6 +585,7 @@ static void dynamic_destroy(bench* w, const operation* o, void* object)
     if (d->recording) es_recording_end(d->recording);
     es_recording_destroy(d->recording);
     es_world_destroy(d->world);
+    free(d->state);
     free(d);
 }
 
@@ -592,6 +594,43 @@ static es_result dynamic_moving(bench* w, const operation* o, void** object)
 {
     es_result result = make_dynamic(w, o, object);
     return result ? result : es_world_step(((dynamic*)*object)->world, 0.1f);
+}
+
+static es_result keep_state(dynamic* d)
+{
+    size_t size = 0;
+    es_result result = es_world_save(d->world, NULL, &size);
+    if (result) return result;
+    d->state = malloc(sizeof *d->state + size);
+    d->state->size = size;
+    return es_world_save(d->world, d->state->bytes, &size);
+}
+
+/* A cloth that is whole in the world and torn in the state, or the other way round. */
+static es_result dynamic_torn(bench* w, const operation* o, void** object)
+{
+    es_result result = dynamic_moving(w, o, object);
+    dynamic* d = *object;
+    if (!result) result = keep_state(d);
+    if (!result) result = es_world_soft_tear(d->world, d->cloth, (const double[3]){0.45, 2, 0.45}, 0.3f);
+    if (!result) result = es_world_step(d->world, 0.1f);
+    if (result || o->kind == TO_WHOLE) return result;
+    saved* whole = d->state;
+    result = keep_state(d);
+    if (!result) result = es_world_restore(d->world, whole->bytes, whole->size);
+    free(whole);
+    return result;
+}
+
+/* What memory ran out for half-way may be no state that ever was, but it can go on, and be restored. */
+static es_result dynamic_restore(bench* w, const operation* o, void** object)
+{
+    dynamic* d = *object;
+    es_result result = es_world_restore(d->world, d->state->bytes, d->state->size);
+    if (result != ES_OUT_OF_MEMORY) return result;
+    memory.left = -1;
+    for (int i = 0; i < 3; i++) assert_int_equal(es_world_step(d->world, 0.05f), ES_OK);
+    return es_context_last_result(w->context);
 }
 
 static es_result dynamic_change(bench* w, const operation* o, void** object)
@@ -826,6 +865,8 @@ static const operation operations[] = {
     {"let go of all", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, LET_ALL_GO},
     {"hold a vertex", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, HOLD},
     {"soften a cloth", 0, dynamic_moving, dynamic_change, dynamic_hash, dynamic_destroy, NULL, SOFTEN},
+    {"restore a torn cloth", 0, dynamic_torn, dynamic_restore, dynamic_hash, dynamic_destroy, NULL, TO_TORN},
+    {"restore a whole cloth", 0, dynamic_torn, dynamic_restore, dynamic_hash, dynamic_destroy, NULL, TO_WHOLE},
     {"save a recording", 0, make_dynamic, dynamic_change, dynamic_hash, dynamic_destroy, "out.hdr", RECORDED},
     {"deform a mesh", WORLD, NULL, deform, bench_hash, NULL},
     {"set an environment", WORLD | IMAGES, NULL, environment, environment_hash, NULL},

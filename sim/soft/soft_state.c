@@ -112,6 +112,20 @@ static void visit_holds(es_world* world, es_soft_object* soft, state_io* io, uin
     if (io->mode == APPLY) soft->hold_count = count;
 }
 
+/* There was no memory to lay out what was read: of the particles only the first remain, which any layout has places for, and none is held. The
+ * next restore lays out anew. */
+static void lie_untorn(es_world* world, es_soft_object* soft)
+{
+    for (uint32_t i = 0; i < soft->hold_count; i++) {
+        es_world_rereference(world, ES_OBJECT_NODE, soft->holds[i].node, 0);
+        es_world_rereference(world, ES_OBJECT_BODY, soft->holds[i].body, 0);
+    }
+    soft->hold_count = 0;
+    soft->particle_count = soft->first_particles;
+    es_soft_mend(soft);
+    soft->cut = true;
+}
+
 void es_visit_soft(es_world* world, state_io* io, es_soft_object* soft)
 {
     const bool was_cut = soft->cut;
@@ -120,9 +134,10 @@ void es_visit_soft(es_world* world, state_io* io, es_soft_object* soft)
     visit_holds(world, soft, io, count);
     if (io->mode == APPLY && io->good) {
         bool good = !(was_cut || soft->cut) || es_soft_relay(world, soft);
+        if (!good) lie_untorn(world, soft);
         if (!good || !es_soft_make_anchors(world->context, soft)) {
             soft->anchors.active = false; /* those there are may be of another layout */
-            io->good = false; /* memory ran out half-way: nothing of this cloth can be relied on, but nothing is out of bounds either */
+            io->good = false;
             io->no_memory = true;
             return;
         }

@@ -255,7 +255,12 @@ bool es_soft_relay(es_world* world, es_soft_object* soft)
     es_mesh_object* mesh = es_slots_get(&world->slots[ES_OBJECT_MESH], soft->desc.mesh.id);
     torn_mesh shown;
     soft->carried = 0;
-    if (!es_soft_lay_out(world->context, soft, NULL) || !make_torn_mesh(world, soft, mesh, &shown)) return false;
+    if (!make_torn_mesh(world, soft, mesh, &shown)) return false;
+    if (!es_soft_lay_out(world->context, soft, NULL)) {
+        es_vertex_fans_free(world->context, &shown.fans);
+        es_arena_free(&shown.arena);
+        return false;
+    }
     show_torn_mesh(world, soft, mesh, &shown);
     return true;
 }
