@@ -357,8 +357,9 @@ void ES_KERNEL(es_sim_contacts_relax)(const es_solver_job* job, uint32_t begin, 
 }
 
 /* Where bodies met fast enough and pressed: they part at `restitution` times that speed. One point's impulse changes the speed of the others
- * of its manifold, so they take turns until all have theirs: only then a bounce without loss keeps the energy, and gains none. */
-enum { BOUNCE_ROUNDS = 4 };
+ * of its manifold, so they take turns, a fixed number: they come close to their speeds, no more, and what that would gain in energy is taken off
+ * afterwards (sim/rigid/bounce_limit.h). */
+enum { POINT_ROUNDS = 4 };
 
 void ES_KERNEL(es_sim_contacts_bounce)(const es_solver_job* job, uint32_t begin, uint32_t end)
 {
@@ -370,7 +371,7 @@ void ES_KERNEL(es_sim_contacts_bounce)(const es_solver_job* job, uint32_t begin,
         motion a = gather(records, vi_load(c->a)), b = gather(records, vi_load(c->b));
         const vf mass_a = vf_load(c->mass_a), mass_b = vf_load(c->mass_b), restitution = vf_load(c->restitution);
         const v3 n = load3(&c->normal);
-        const uint32_t turns = c->point_count > 1 ? c->point_count * BOUNCE_ROUNDS : 1;
+        const uint32_t turns = c->point_count > 1 ? c->point_count * POINT_ROUNDS : 1;
         for (uint32_t turn = 0; turn < turns; turn++) {
             es_wide_point* p = &c->points[turn % c->point_count];
             vf approach = vf_load(p->approach), old = vf_load(p->impulse);

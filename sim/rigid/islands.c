@@ -106,6 +106,22 @@ bool es_islands_reserve(es_world* world)
            es_grow(world->context, (void**)&rigid->stillness, &rigid->stillness_capacity, 0, count, sizeof *rigid->stillness);
 }
 
+void es_find_islands(es_world* world)
+{
+    es_rigid* rigid = world->rigid;
+    uint32_t* parents = rigid->parents;
+    for (uint32_t i = 0; i < rigid->dynamic_count; i++) parents[i] = i;
+    for (size_t i = 0; i < rigid->contacts.count; i++) {
+        const es_contact* contact = &rigid->contacts.list[i];
+        if (!contact->count) continue;
+        const es_body_object *a = es_body_of_key(world, contact->a), *b = es_body_of_key(world, contact->b);
+        if (a->type == ES_BODY_DYNAMIC && b->type == ES_BODY_DYNAMIC) join(parents, a->index, b->index);
+    }
+    es_joints_unite(world, parents, join);
+}
+
+uint32_t es_island_of(const es_world* world, uint32_t i) { return root_of(world->rigid->parents, i); }
+
 void es_islands_sleep(es_world* world, float h)
 {
     es_rigid* rigid = world->rigid;
@@ -121,14 +137,7 @@ void es_islands_sleep(es_world* world, float h)
     const uint32_t count = rigid->dynamic_count;
     uint32_t* parents = rigid->parents;
     float* stillness = rigid->stillness;
-    for (uint32_t i = 0; i < count; i++) parents[i] = i;
-    for (size_t i = 0; i < rigid->contacts.count; i++) {
-        const es_contact* contact = &rigid->contacts.list[i];
-        if (!contact->count) continue;
-        const es_body_object *a = es_body_of_key(world, contact->a), *b = es_body_of_key(world, contact->b);
-        if (a->type == ES_BODY_DYNAMIC && b->type == ES_BODY_DYNAMIC) join(parents, a->index, b->index);
-    }
-    es_joints_unite(world, parents, join);
+    es_find_islands(world);
     for (uint32_t i = 0; i < count; i++) stillness[i] = 1e30f;
     for (uint32_t i = 0; i < count; i++) {
         const es_body_object* body = es_slots_at(slots, rigid->moving[i]);

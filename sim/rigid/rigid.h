@@ -4,6 +4,7 @@
  *   broad_phase.c boxes in the tree, pairs, contacts         narrow_phase.c manifolds, warm starting by feature
  *   islands.c     what sleeps and wakes together             solver.c     constraints, colours, substeps
  *   joints.c, joint_solver.c                                 hands.c      what the player holds
+ *   bounce_limit.h bounces gain no energy
  *   continuous.c  fast bodies stop at what they would pass   crew.h       threads that go through the solver's stages together
  *   rigid_state.h saving and restoring                       step.c       the order of all this
  *
@@ -174,8 +175,12 @@ void es_body_wake(es_world* world, es_body_object* body); /* and its island */
 void es_body_wake_neighbours(es_world* world, es_body_object* body);
 /* Puts each contact on the list where it belongs. False after es_fail. */
 bool es_sort_contacts(es_world* world);
-/* Memory for the next, before bodies move; false after es_fail. */
+/* Memory for the next three, before bodies move; false after es_fail. */
 bool es_islands_reserve(es_world* world);
+/* Into rigid->parents, by bodies' numbers among the solver's: what hangs together. */
+void es_find_islands(es_world* world);
+/* Then: the least number of a body of the same island as the dynamic body i. */
+uint32_t es_island_of(const es_world* world, uint32_t i);
 /* After a step: islands that have been still long enough fall asleep. */
 void es_islands_sleep(es_world* world, float h);
 

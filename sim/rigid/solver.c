@@ -6,12 +6,13 @@
 
 #include "platform/maths.h"
 #include "sim/kernel_table.h"
+#include "sim/rigid/bounce_limit.h"
 #include "sim/rigid/crew.h"
 #include "sim/rigid/joints.h"
 
-enum { RECORD_GRAIN = 64, CONTACT_GRAIN = 4, CONTACT_HERTZ = 30, CONTACT_DAMPING = 1, BURDEN_DAMPING = 4, BURDEN = 60, BOUNCE_ROUNDS = 4 };
+enum { RECORD_GRAIN = 64, CONTACT_GRAIN = 4, CONTACT_HERTZ = 30, CONTACT_DAMPING = 1, BURDEN_DAMPING = 4, BURDEN = 60, BOUNCE_SWEEPS = 4 };
 
-typedef enum stage_kind { LOAD, PREPARE, PREPARE_JOINTS, ACCELERATE, WARM_JOINTS, WARM, SOLVE_JOINTS, SOLVE, MOVE, RELAX_JOINTS, RELAX, BOUNCE, STORE_JOINTS, STORE, UNLOAD } stage_kind;
+typedef enum stage_kind { LOAD, PREPARE, PREPARE_JOINTS, ACCELERATE, WARM_JOINTS, WARM, SOLVE_JOINTS, SOLVE, MOVE, RELAX_JOINTS, RELAX, KEEP, BOUNCE, LIMIT_BOUNCES, STORE_JOINTS, STORE, UNLOAD } stage_kind;
 
 typedef struct entry { uint32_t contact, manifold, a, b, colour; } entry;
 
@@ -19,6 +20,10 @@ typedef struct es_solver {
     es_solver_job job;
     float *velocity, *moved, *mass, *drive, *rotation;
     size_t velocity_capacity, moved_capacity, mass_capacity, drive_capacity, rotation_capacity;
+    float* unbounced;              /* velocities before the bounces */
+    size_t unbounced_capacity;
+    es_bounce_island* islands;
+    size_t island_capacity;
     es_wide_contact* wide;
     size_t wide_capacity;
     entry* entries;
@@ -43,6 +48,8 @@ void es_solver_free(es_context* context, es_solver* solver)
     es_release(context, solver->mass, solver->mass_capacity * sizeof(float));
     es_release(context, solver->drive, solver->drive_capacity * sizeof(float));
     es_release(context, solver->rotation, solver->rotation_capacity * sizeof(float));
+    es_release(context, solver->unbounced, solver->unbounced_capacity * sizeof(float));
+    es_release(context, solver->islands, solver->island_capacity * sizeof *solver->islands);
     es_release(context, solver->wide, solver->wide_capacity * sizeof *solver->wide);
     es_release(context, solver->entries, solver->entry_capacity * sizeof *solver->entries);
     es_release(context, solver->colours, solver->colour_capacity * sizeof *solver->colours);
@@ -258,7 +265,11 @@ static void plan(es_solver* solver, uint32_t substeps)
         add_stage(solver, RELAX_JOINTS, 0, joints, 1);
         add_contacts(solver, RELAX);
     }
-    for (uint32_t round = 0; round < BOUNCE_ROUNDS && solver->bouncy; round++) add_contacts(solver, BOUNCE);
+    if (solver->bouncy) {
+        add_stage(solver, KEEP, 0, bodies->dynamic, RECORD_GRAIN);
+        for (uint32_t sweep = 0; sweep < BOUNCE_SWEEPS; sweep++) add_contacts(solver, BOUNCE);
+        add_stage(solver, LIMIT_BOUNCES, 0, 1, 1);
+    }
     add_stage(solver, STORE_JOINTS, 0, joints, 1);
     add_stage(solver, STORE, 0, wide, CONTACT_GRAIN);
     add_stage(solver, UNLOAD, 0, bodies->count, RECORD_GRAIN);
@@ -283,7 +294,9 @@ static void run_block(void* user, uint32_t kind, uint32_t begin, uint32_t end)
     case MOVE: kernels->rigid_move(job, begin, end); break;
     case RELAX_JOINTS: es_joints_solve(solver->world, job, false); break;
     case RELAX: kernels->contacts_relax(job, begin, end); break;
+    case KEEP: memcpy(solver->unbounced + 8 * (size_t)begin, solver->velocity + 8 * (size_t)begin, 8 * (size_t)(end - begin) * sizeof(float)); break;
     case BOUNCE: kernels->contacts_bounce(job, begin, end); break;
+    case LIMIT_BOUNCES: es_limit_bounces(solver->world, &job->bodies, solver->unbounced, solver->islands, solver->h); break;
     case STORE_JOINTS: es_joints_store(solver->world, job); break;
     case STORE: kernels->contacts_store(job, begin, end); break;
     case UNLOAD:
@@ -308,12 +321,14 @@ static bool reserve(es_solver* solver, uint32_t substeps)
     const es_rigid* rigid = world->rigid;
     size_t records = ((size_t)solver->job.bodies.still + ES_LANES) / ES_LANES * ES_LANES, manifolds = 0;
     for (size_t i = 0; i < rigid->contacts.count; i++) manifolds += rigid->contacts.list[i].count;
-    size_t stages = 16 + (size_t)(substeps + 1) * (5 + 3 * (ES_COLOURS + 1)) + (size_t)BOUNCE_ROUNDS * (ES_COLOURS + 1);
+    size_t stages = 16 + (size_t)(substeps + 1) * (5 + 3 * (ES_COLOURS + 1)) + (size_t)BOUNCE_SWEEPS * (ES_COLOURS + 1);
     return es_grow(context, (void**)&solver->velocity, &solver->velocity_capacity, 0, 8 * records, sizeof(float)) &&
            es_grow(context, (void**)&solver->moved, &solver->moved_capacity, 0, 8 * records, sizeof(float)) &&
            es_grow(context, (void**)&solver->mass, &solver->mass_capacity, 0, 8 * records, sizeof(float)) &&
            es_grow(context, (void**)&solver->drive, &solver->drive_capacity, 0, 8 * records, sizeof(float)) &&
            es_grow(context, (void**)&solver->rotation, &solver->rotation_capacity, 0, 4 * records, sizeof(float)) &&
+           es_grow(context, (void**)&solver->unbounced, &solver->unbounced_capacity, 0, 8 * records, sizeof(float)) &&
+           es_grow(context, (void**)&solver->islands, &solver->island_capacity, 0, records, sizeof *solver->islands) &&
            es_grow(context, (void**)&solver->colours, &solver->colour_capacity, 0, records, sizeof *solver->colours) &&
            es_grow(context, (void**)&solver->entries, &solver->entry_capacity, 0, manifolds, sizeof *solver->entries) &&
            es_grow(context, (void**)&solver->stages, &solver->stage_capacity, 0, stages, sizeof *solver->stages);
@@ -340,6 +355,7 @@ bool es_solve(es_world* world, float h, uint32_t substeps)
     place(solver);
     job->contacts = solver->wide;
     job->manifolds = rigid->contacts.manifolds;
+    solver->h = h;
     job->h = h / (float)substeps;
     job->inverse_h = 1.0f / job->h;
     job->max_turn = 0.25f * ES_PI;

@@ -5,7 +5,7 @@
  *     velocities += forces; impulses of the last substep are applied; contacts are solved once, as stiff damped springs
  *     positions += velocities; contacts are solved once more without the springs' push, so that it leaves no speed behind
  *
- * and bounces come last, once. Geometry is not computed anew between substeps: separations follow from how bodies moved since the step
+ * and bounces come last, once; they give back no more energy than was there (sim/rigid/bounce_limit.h). Geometry is not computed anew between substeps: separations follow from how bodies moved since the step
  * began (es_solver.moved), to first order in rotations.
  *
  * Friction acts on the manifold as a whole: two directions at the middle of its points, and a twist about the normal.
