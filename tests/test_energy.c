@@ -1,7 +1,14 @@
 /* Bodies gain no energy that nothing gave them, by the measure of `earthshine soak`; and that measure sees it when they do, and is not
  * misled by what drives them. */
 #include "demos/energy_watch.h"
+#include "platform/random.h"
 #include "tests/rigid_tools.h"
+
+#if defined __SANITIZE_ADDRESS__ || defined __SANITIZE_THREAD__
+#define SMALL 1
+#else
+#define SMALL 0
+#endif
 
 /* Steps and watches; `each` may act on the world before a step. */
 static energy_gain watch(arena* a, energy_watch* w, int steps, void (*each)(arena* a, int step, void* user), void* user)
@@ -103,6 +110,100 @@ static void bouncing(void** unused)
     assert_true(gain.joules < gain.allowed);
     for (int i = 0; i < 8; i++) after += (double)state_of(&a, bodies[i]).kinetic_energy;
     assert_true(after < 1.01 * before && after > 0.5 * before);
+    free_arena(&a);
+}
+
+/* Three cubes that lose nothing fly at a point where they meet at once, again and again from new places; friction or none. What they have together
+ * never rises: not by one of many contacts, and not by many of them. */
+static void cubes_that_meet_at_once(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    uint32_t counter = 0;
+    double worst = 0;
+    int met = 0;
+    for (int round = 0; round < (SMALL ? 20 : 400); round++) {
+        es_body cubes[3];
+        double before = 0;
+        for (int i = 0; i < 3; i++) {
+            es_shape_desc shape = box_shape(0.12f, 0.12f, 0.12f);
+            shape.restitution = 1;
+            shape.friction = round % 2 ? 0.5f : 0;
+            es_body_desc desc = es_default_body_desc();
+            desc.shapes = &shape;
+            desc.shape_count = 1;
+            float r[9];
+            for (int k = 0; k < 9; k++) r[k] = 2 * es_unit_float(es_random_u32(71, counter++)) - 1;
+            const double angle = 2.0943951 * i;
+            const float x = (float)cos(angle), z = (float)sin(angle);
+            desc.position[0] = 0.4 * (double)x + 0.01 * (double)r[0];
+            desc.position[1] = 0.04 * (double)r[1];
+            desc.position[2] = 0.4 * (double)z + 0.01 * (double)r[2];
+            desc.velocity = (es_vec3){-5 * x + 0.3f * r[3], 0.3f * r[4], -5 * z + 0.3f * r[5]};
+            if (round % 4 > 1) desc.angular_velocity = (es_vec3){5 * r[6], 5 * r[7], 5 * r[8]};
+            assert_int_equal(es_world_add_body(a.world, &desc, &cubes[i]), ES_OK);
+            before += (double)state_of(&a, cubes[i]).kinetic_energy;
+        }
+        for (int i = 0; i < 30; i++) {
+            step(&a, 1);
+            double now = 0;
+            for (int k = 0; k < 3; k++) now += (double)state_of(&a, cubes[k]).kinetic_energy;
+            if (now / before - 1 > worst) worst = now / before - 1;
+        }
+        for (int i = 0; i < 3; i++) {
+            const es_body_state s = state_of(&a, cubes[i]);
+            met += (double)s.velocity.x * s.centre[0] + (double)s.velocity.z * s.centre[2] > 0;
+            assert_int_equal(es_world_destroy_body(a.world, cubes[i]), ES_OK);
+        }
+    }
+    if (worst > 1e-4) fail_msg("they gained %.3g of what they had", worst);
+    assert_true(met > (SMALL ? 50 : 1100)); /* and fly apart */
+    free_arena(&a);
+}
+
+/* Many of them in a box that is too small for them to be apart, for as long as it takes to bounce some thousands of times. */
+static void crowd(void** unused)
+{
+    arena a = make_arena(1, 0, false);
+    set_gravity(&a, 0, 0, 0);
+    for (int k = 0; k < 6; k++) {
+        es_shape_desc wall = box_shape(k / 2 == 0 ? 0.5f : 2, k / 2 == 1 ? 0.5f : 2, k / 2 == 2 ? 0.5f : 2);
+        wall.restitution = 1;
+        wall.friction = 0;
+        const double at = k % 2 ? 1.0 : -1.0;
+        add_body(&a, ES_BODY_STATIC, &wall, k / 2 == 0 ? at : 0, k / 2 == 1 ? at : 0, k / 2 == 2 ? at : 0, no_turn);
+    }
+    es_body cubes[8];
+    double before = 0, last = 0;
+    for (int i = 0; i < 8; i++) {
+        es_shape_desc shape = box_shape(0.1f, 0.1f, 0.1f);
+        shape.restitution = 1;
+        shape.friction = 0;
+        es_body_desc desc = es_default_body_desc();
+        desc.shapes = &shape;
+        desc.shape_count = 1;
+        desc.continuous = true;
+        for (int k = 0; k < 3; k++) desc.position[k] = (i >> k & 1) ? 0.24 : -0.24;
+        desc.velocity = (es_vec3){4 - (float)i, 3.0f - (float)(i * i % 7), 2.0f + (float)(i % 3)};
+        desc.angular_velocity = (es_vec3){(float)i, 3, 5 - (float)i};
+        assert_int_equal(es_world_add_body(a.world, &desc, &cubes[i]), ES_OK);
+        before += (double)state_of(&a, cubes[i]).kinetic_energy;
+    }
+    energy_watch* w = energy_watch_open(a.world);
+    assert_non_null(w);
+    double most = 0;
+    for (int i = 0; i < (SMALL ? 200 : 2000); i++) {
+        step(&a, 1);
+        assert_true(energy_watch_step(w, a.world));
+        last = 0;
+        for (int k = 0; k < 8; k++) last += (double)state_of(&a, cubes[k]).kinetic_energy;
+        if (last > most) most = last;
+    }
+    const energy_gain gain = energy_watch_worst(w);
+    assert_int_equal(gain.driven, 0);
+    if (gain.joules > 0.001 * gain.allowed) fail_msg("one gained %.3g J of %.3g J", gain.joules, gain.allowed);
+    if (most > 1.0001 * before) fail_msg("they gained %.3g of what they had", most / before - 1);
+    energy_watch_close(w);
     free_arena(&a);
 }
 
@@ -236,6 +337,8 @@ int main(void)
         cmocka_unit_test(falling_and_resting),
         cmocka_unit_test(creeping),
         cmocka_unit_test(bouncing),
+        cmocka_unit_test(cubes_that_meet_at_once),
+        cmocka_unit_test(crowd),
         cmocka_unit_test(pushed_by_what_moves),
         cmocka_unit_test(driven_by_joints_and_hands),
         cmocka_unit_test(cloth_over_a_box),
