@@ -90,9 +90,11 @@ static void release_hold(es_world* world, const es_soft_hold* hold)
     es_world_rereference(world, ES_OBJECT_BODY, hold->body, 0);
 }
 
-/* In the order of particles, so that it does not matter in which order they were held. */
-static es_result add_hold(es_world* world, es_soft_object* soft, const es_soft_attachment* attachment)
+/* In the order of particles, so that it does not matter in which order they were held. `replaced` is the hold that was there, or none: its
+ * references are the caller's to release, or to keep when he takes the new one back. */
+static es_result add_hold(es_world* world, es_soft_object* soft, const es_soft_attachment* attachment, es_soft_hold* replaced)
 {
+    *replaced = (es_soft_hold){.particle = ES_SOFT_NONE};
     uint32_t particle = particle_for(world, soft, attachment->vertex);
     if (particle == ES_SOFT_NONE) return ES_INVALID_ARGUMENT;
     if (attachment->node.id && attachment->body.id)
@@ -107,7 +109,7 @@ static es_result add_hold(es_world* world, es_soft_object* soft, const es_soft_a
     uint32_t at = 0;
     while (at < soft->hold_count && soft->holds[at].particle < particle) at++;
     if (at < soft->hold_count && soft->holds[at].particle == particle) {
-        release_hold(world, &soft->holds[at]);
+        *replaced = soft->holds[at];
     } else {
         memmove(soft->holds + at + 1, soft->holds + at, (soft->hold_count - at) * sizeof *soft->holds);
         soft->hold_count++;
@@ -118,14 +120,17 @@ static es_result add_hold(es_world* world, es_soft_object* soft, const es_soft_a
     return ES_OK;
 }
 
-static void drop_hold(es_world* world, es_soft_object* soft, uint32_t particle)
+static void take_back_hold(es_world* world, es_soft_object* soft, uint32_t particle, const es_soft_hold* replaced)
 {
-    uint32_t kept = 0;
-    for (uint32_t i = 0; i < soft->hold_count; i++) {
-        if (soft->holds[i].particle == particle) release_hold(world, &soft->holds[i]);
-        else soft->holds[kept++] = soft->holds[i];
+    uint32_t at = 0;
+    while (soft->holds[at].particle != particle) at++;
+    release_hold(world, &soft->holds[at]);
+    if (replaced->particle == particle) {
+        soft->holds[at] = *replaced;
+    } else {
+        soft->hold_count--;
+        memmove(soft->holds + at, soft->holds + at + 1, (soft->hold_count - at) * sizeof *soft->holds);
     }
-    soft->hold_count = kept;
 }
 
 static bool fill(es_world* world, es_soft_object* soft, es_mesh_object* mesh, const es_soft_desc* desc)
@@ -172,7 +177,11 @@ es_result es_world_add_soft(es_world* world, const es_soft_desc* desc, es_soft* 
     es_fp_environment environment = es_fp_enter();
     bool good = fill(world, soft, mesh, desc);
     if (!good) result = es_context_last_result(world->context);
-    for (uint32_t i = 0; i < desc->attachment_count && result == ES_OK; i++) result = add_hold(world, soft, &desc->attachments[i]);
+    for (uint32_t i = 0; i < desc->attachment_count && result == ES_OK; i++) {
+        es_soft_hold replaced;
+        result = add_hold(world, soft, &desc->attachments[i], &replaced);
+        if (result == ES_OK) release_hold(world, &replaced);
+    }
     if (result == ES_OK && !es_soft_make_anchors(world->context, soft)) result = es_context_last_result(world->context);
     const uint32_t reserve = soft->vertex_count - mesh->raster.vertex_count;
     if (result == ES_OK && reserve && !es_mesh_reserve(world, mesh, reserve)) result = es_context_last_result(world->context);
@@ -291,11 +300,13 @@ es_result es_world_soft_attach(es_world* world, es_soft handle, const es_soft_at
     if (!attachment) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_soft_attach: attachment must not be NULL");
     es_world_refresh(world);
     es_fp_environment environment = es_fp_enter();
-    const uint32_t before = soft->hold_count;
-    es_result result = add_hold(world, soft, attachment);
+    es_soft_hold replaced;
+    es_result result = add_hold(world, soft, attachment, &replaced);
     if (result == ES_OK && !es_soft_make_anchors(world->context, soft)) {
         result = es_context_last_result(world->context);
-        if (soft->hold_count > before) drop_hold(world, soft, particle_for(world, soft, attachment->vertex)); /* the anchors have no room for it */
+        take_back_hold(world, soft, particle_for(world, soft, attachment->vertex), &replaced); /* the anchors have no room for it */
+    } else if (result == ES_OK) {
+        release_hold(world, &replaced);
     }
     es_fp_leave(environment);
     if (result != ES_OK) return result;
