@@ -151,8 +151,8 @@ static bool touch(es_world* world)
 {
     es_rigid* rigid = world->rigid;
     if (!es_find_contacts(world)) return false;
-    /* of this step (es_report_pressed's too: each of next enters once at most), and of all that touches after it */
-    if (!es_events_reserve(world, rigid->contacts.count + 2 * rigid->next.count + rigid->asleep.count)) return false;
+    /* of this step (es_report_pressed's too: each of next, and of those that wake, enters once at most), and of all that touches after it */
+    if (!es_events_reserve(world, rigid->contacts.count + 2 * rigid->next.count + 2 * rigid->asleep.count)) return false;
     es_collide_contacts(world);
     es_report_contacts(world);
     es_contacts old = rigid->contacts;

@@ -118,6 +118,7 @@ bool es_soft_find_pairs(es_context* context, es_soft_object* soft, float h)
         search.count[s] = (uint32_t)total;
         total += own;
     }
+    if (total <= MOST_PAIRS) soft->crumpled = false;
     if (total == 0) return true;
     if (total > MOST_PAIRS) {
         if (!soft->crumpled)
@@ -126,7 +127,6 @@ bool es_soft_find_pairs(es_context* context, es_soft_object* soft, float h)
         soft->crumpled = true;
         return true;
     }
-    soft->crumpled = false;
     if (!es_grow(context, (void**)&soft->pairs, &soft->pair_capacity, 0, 2 * (size_t)total, sizeof *soft->pairs)) return false;
     search.fill = true;
     es_parallel_for(context, slots, 256, search_body, &search);

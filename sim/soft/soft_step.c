@@ -408,10 +408,11 @@ es_result es_soft_step_one(es_world* world, es_soft_object* soft, float h, uint3
 es_result es_soft_step(es_world* world, float h, uint32_t substeps)
 {
     const es_slots* slots = &world->slots[ES_OBJECT_SOFT];
+    es_result first = ES_OK; /* what one cloth has no memory for the others do not miss */
     for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
         es_soft_object* soft = es_slots_at(slots, slot);
         es_result result = soft ? es_soft_step_one(world, soft, h, substeps) : ES_OK;
-        if (result != ES_OK) return result;
+        if (first == ES_OK) first = result;
     }
-    return ES_OK;
+    return first;
 }
