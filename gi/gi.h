@@ -138,7 +138,8 @@ typedef struct es_renderer es_renderer;
 /* settings NULL: defaults. SETTING_VALUE when one is outside its range. */
 ES_API es_result es_renderer_create(es_context* context, const es_renderer_settings* settings, es_renderer** renderer);
 ES_API void es_renderer_destroy(es_renderer* renderer);
-/* Takes effect with the next frame; changed sizes reallocate. */
+/* Takes effect with the next frame, which reallocates what has another size. SETTING_VALUE when one is outside its range; nothing
+ * is changed then. */
 ES_API es_result es_renderer_configure(es_renderer* renderer, const es_renderer_settings* settings);
 ES_API es_renderer_settings es_renderer_get_settings(const es_renderer* renderer);
 
@@ -178,7 +179,7 @@ typedef struct es_bounce_stats {
 typedef struct es_frame_stats {
     uint64_t frame;           /* frames rendered before this one */
     double milliseconds;
-    const es_pass_stats* passes;
+    const es_pass_stats* passes; /* valid until the next frame */
     size_t pass_count;
     es_raster_stats raster;   /* of the camera's G-buffer */
     const es_bounce_stats* bounces; /* of bounce 1, 2, …; valid until the next frame */
@@ -191,9 +192,11 @@ typedef struct es_vpl {
     float flux[3];            /* radiant exitance × area share: intensity along the normal is flux / pi, W/sr */
     uint32_t bounce;          /* that it sends to the picture, from 1 */
 } es_vpl;
-/* Virtual point lights of the last frame, relative to es_world_origin, for overlays. */
+/* Virtual point lights of the last frame, relative to es_world_origin, for overlays: writes the first of them, at most `capacity` lights, and
+ * returns how many there are. */
 ES_API size_t es_renderer_vpls(const es_renderer* renderer, es_vpl* vpls, size_t capacity);
-/* Positions, relative to es_world_origin, of the points one imperfect shadow map is drawn from, 3 floats each. */
+/* Positions, relative to es_world_origin, of the points one imperfect shadow map is drawn from: writes the first of them, at most `capacity`
+ * points, 3 floats each, and returns how many there are. */
 ES_API size_t es_renderer_points(const es_renderer* renderer, uint32_t map, float* positions, size_t capacity);
 
 /* ---- reference: a progressive path tracer over the same world ------------------------------------------------------------------- */

@@ -100,7 +100,12 @@ ES_API es_result es_world_configure(es_world* world, const es_world_settings* se
  *
  * Bodies and cloth see clips and motions as of each of their own steps, so that what they do does not depend on how time is cut into
  * frames; shown are they as of the new time, between the two steps around it (Fiedler's fixed timestep, without its frame of delay: the
- * step ahead is made first). The cost grows with dt × speed / step, which nothing limits. */
+ * step ahead is made first). The cost grows with dt × speed / step, which nothing limits.
+ *
+ * INVALID_ARGUMENT: dt is outside its range; WRONG_STATE: called from the step function; nothing has moved then. OUT_OF_MEMORY, MEMORY_CAP: time,
+ * clips, motions and the step function have gone to the new time all the same, so that the caller goes on with the next frame; bodies and cloth
+ * stay behind, and the next call makes up for the fixed steps that are missing. Of the fixed step that failed, nothing has happened to bodies
+ * nor cloth if it was bodies that found no memory; if it was a cloth, bodies and the other cloths have made it and that one has left it out for good. */
 ES_API es_result es_world_step(es_world* world, float dt);
 ES_API double es_world_time(const es_world* world);
 /* Called by es_world_step after the clips, with the new time. It may use every function of the world but step and destroy. */
@@ -431,8 +436,10 @@ ES_API es_result es_world_apply_impulse(es_world* world, es_body body, es_vec3 i
 ES_API es_result es_world_apply_force(es_world* world, es_body body, es_vec3 force, const double at[3]);
 ES_API es_result es_world_wake_body(es_world* world, es_body body);
 
-/* What began and ended to touch during the last es_world_step, in the order of its fixed steps, within one by bodies and shapes. A pair
- * that ends because one of them is destroyed is reported as left, with a stale handle. Valid until the next step or change of bodies. */
+/* What began and ended to touch during the last es_world_step, in the order of its fixed steps, within one by bodies and shapes. Touching is
+ * predicted: a pair enters when its surfaces will meet within the fixed step, as far as can be told before it, so that the event may come before
+ * they touch, and when another contact turns them aside they may not touch at all. Pairs that only the solver pressed together follow after
+ * the others of that step. A pair that ends because one of them is destroyed is reported as left, with a stale handle. Valid until the next step or change of bodies. */
 typedef struct es_contact_event {
     es_body a, b;
     uint32_t shape_a, shape_b; /* indices into the descs' shapes */
@@ -620,6 +627,7 @@ ES_API es_result es_world_get_soft_vertex(const es_world* world, es_soft soft, u
 ES_API es_result es_world_soft_impulse(es_world* world, es_soft soft, uint32_t vertex, es_vec3 impulse);
 /* A vertex that is held already is held anew. */
 ES_API es_result es_world_soft_attach(es_world* world, es_soft soft, const es_soft_attachment* attachment);
+/* OK also when nothing held the vertex. INVALID_ARGUMENT when there is no such vertex; OUT_OF_MEMORY, or MEMORY_CAP: held as before, and so above. */
 ES_API es_result es_world_soft_detach(es_world* world, es_soft soft, uint32_t vertex_or_all);
 /* Vertices within `radius` of `point` part into one for each of their triangles, edges that only pass through there tear. WRONG_STATE when it is
  * not tearable. */
