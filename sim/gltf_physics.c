@@ -204,6 +204,7 @@ es_result es_gltf_physics_add(const es_gltf_physics* physics)
     if (result == ES_OK) result = es_gltf_add_soft(&l);
     es_release(physics->context, l.owner, count * sizeof *l.owner);
     es_release(physics->context, l.bodies, count * sizeof *l.bodies);
+    if (result != ES_OK) return result; /* which is what matters then */
     warn(&l, l.left.inertia, "bodies have a given centre of mass or inertia, which follow from their shapes here");
     warn(&l, l.left.combine, "physics materials say how to combine with others, here it is the geometric mean of frictions and the larger restitution");
     warn(&l, l.left.joints, "joints are left out, their limits leave other freedoms than those of balls, hinges, distances and fixed joints");

@@ -208,6 +208,7 @@ struct left_out {
     size_t lines_and_points = 0, partial_triangles = 0, blended = 0, sheared = 0;
     size_t tinted_specular = 0, specular_textures = 0, sourceless_textures = 0, uv_sets = 0, dropped_channels = 0, dropped_pointers = 0, weightless = 0;
     std::string blended_name, sheared_name, pointer_name;
+    bool light = false, camera = false; /* and was added */
 };
 
 class importer
@@ -245,8 +246,8 @@ class importer
         add_cameras();
         add_clips();
         add_physics();
-        warn_of_left_out();
         check(es_world_finish_opening(world));
+        warn_of_left_out();
         es_world* finished = world;
         world = nullptr;
         return finished;
@@ -1512,7 +1513,7 @@ class importer
         check(es_world_add_node(world, &node_desc, &desc.node));
         es_light light;
         check(es_world_add_light(world, &desc, &light));
-        es_log(context, ES_LOG_WARNING, ES_NOTE, "%s: has no light; a directional light of 3 W/m² from above the camera's left shoulder was added (world.default-light=false leaves it out)", path);
+        left.light = true;
     }
 
     /* Rotation that turns z to the unit vector `back`, with y as upright as it can be. */
@@ -1594,7 +1595,7 @@ class importer
         check(es_world_add_node(world, &node_desc, &desc.node));
         es_camera camera;
         check(es_world_add_camera(world, &desc, &camera));
-        es_log(context, ES_LOG_WARNING, ES_NOTE, "%s: has no camera; one that frames everything was added", path);
+        left.camera = true;
         if (needs_light) {
             es_quat q = node_desc.transform.rotation;
             add_default_light(es_quat_rotate(q, {1, 0, 0}), es_quat_rotate(q, {0, 1, 0}), back);
@@ -1872,8 +1873,13 @@ class importer
 
     /* ---- the end -------------------------------------------------------------------------------------------------------------------------------- */
 
+    /* After all else, so that a refusal stands alone. */
     void warn_of_left_out()
     {
+        if (left.camera) { es_log(context, ES_LOG_WARNING, ES_NOTE, "%s: has no camera; one that frames everything was added", path); }
+        if (left.light) {
+            es_log(context, ES_LOG_WARNING, ES_NOTE, "%s: has no light; a directional light of 3 W/m² from above the camera's left shoulder was added (world.default-light=false leaves it out)", path);
+        }
         if (left.lines_and_points) { warn("%zu primitives of points or lines are left out, only triangles are drawn", left.lines_and_points); }
         if (left.partial_triangles) { warn("%zu primitives end in an incomplete triangle, which is left out", left.partial_triangles); }
         if (left.dropped_channels) { warn("%zu animation channels with a path other than translation, rotation, scale, weights are left out", left.dropped_channels); }
