@@ -3,6 +3,7 @@
 #include "player.h"
 
 #include <math.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,7 @@ void player_notice(player* p, const char* format, ...)
     vsnprintf(p->notice, sizeof p->notice, format, arguments);
     va_end(arguments);
     p->notice_until = demo_seconds() + 4;
+    p->hint = false;
 }
 
 /* ---- the picture ------------------------------------------------------------------------------------------------------------ */
@@ -190,6 +192,14 @@ static int play_frame(player* p, float elapsed)
     return DEMO_OK;
 }
 
+/* A recording is kept also when the program is told to end. */
+static volatile sig_atomic_t interrupted;
+static void interrupt(int signal_number)
+{
+    (void)signal_number;
+    interrupted = 1;
+}
+
 static int play_loop(player* p)
 {
     double last = demo_seconds();
@@ -200,6 +210,7 @@ static int play_loop(player* p)
         p->seconds = (float)fmin(now - last, 0.1); /* a stall is not made up for by one long step */
         p->frame_milliseconds += ((now - last) * 1000 - p->frame_milliseconds) * (p->frame_milliseconds > 0 ? 0.1 : 1);
         last = now;
+        p->quit |= interrupted != 0;
         if (p->input.close || p->quit) return DEMO_OK;
         if (play_frame(p, p->seconds) != DEMO_OK) return DEMO_BAD_INPUT;
         double spent = demo_seconds() - now;
@@ -213,6 +224,10 @@ static int play_in_window(player* p)
     p->show_timeline = true;
     player_notice(p, "H: all keys   M: scenes   O: settings   Tab: by keyboard");
     p->notice_until += 6;
+    p->hint = true;
+    struct sigaction action = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
     p->divisor = 1;
     p->split.divider = 0.5f;
     for (size_t i = 0; p->options.image_count && i < es_image_name_count(); i++)

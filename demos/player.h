@@ -91,6 +91,7 @@ typedef struct player {
     player_hand hand;
     char notice[256];
     double notice_until;
+    bool hint;                /* the notice is the one about keys, of the start */
     /* panels */
     ui_scroll scene_scroll, settings_scroll, help_scroll;
     char search[UI_EDIT_SIZE];

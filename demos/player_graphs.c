@@ -137,7 +137,7 @@ static void plot(player* p, int height, const char* title, const char* format, c
     float top = ui_plot_top(ui_series_largest(series));
     ui_series_text(series, format, number, sizeof number);
     snprintf(edge, sizeof edge, format, (double)top);
-    snprintf(line, sizeof line, "%s %s, edge %s", title, number, edge);
+    snprintf(line, sizeof line, "%s %s, top of scale %s", title, number, edge);
     ui_label(u, 0, colour, line);
     ui_next_row(u);
     canvas_rect rect = {u->left, u->y, u->right - u->left, height};

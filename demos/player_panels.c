@@ -202,7 +202,7 @@ void player_build_panels(player* p)
     if (p->show_timeline) timeline_panel(p, bottom);
     if (p->show_help) help_panel(p, top, bottom);
     if (p->show_graphs) {
-        int width = columns(p, 46), height = (bottom - top) * 2 / 3;
+        int width = columns(p, 60), height = (bottom - top) * 2 / 3;
         player_graphs_panel(p, (canvas_rect){0, bottom - height, width, height});
     }
     if (p->show_settings) {
@@ -210,5 +210,6 @@ void player_build_panels(player* p)
         player_settings_panel(p, (canvas_rect){left > 0 ? left : 0, top, width, bottom - top});
     }
     if (p->show_scenes) scenes_panel(p, top, bottom);
+    if (p->hint && (p->show_help || p->show_graphs || p->show_settings)) p->notice_until = 0; /* it would be drawn over them */
     notice(p, bottom);
 }

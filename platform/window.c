@@ -52,7 +52,7 @@ typedef struct window_event {
     int action, modifiers;
     float x, y;               /* the pointer, when a button changed */
 } window_event;
-enum { EVENTS = 512 };        /* a minute of a key held down; what comes beyond is lost */
+enum { EVENTS = 512, RING = 1024 }; /* a minute of a key held down; beyond EVENTS presses and characters are lost, releases are not */
 
 struct es_window {
     es_context* context;
@@ -61,7 +61,7 @@ struct es_window {
     const char* backend;
     es_window_input input;
     float cursor_x, cursor_y; /* as of the last event taken */
-    window_event events[EVENTS]; /* a ring of what polls have not told yet */
+    window_event events[RING]; /* a ring of what polls have not told yet */
     uint32_t first_event, event_count;
     /* X11 */
     Display* display;
@@ -109,9 +109,22 @@ static int key_of(int key)
     }
 }
 
+/* Is the key or button down once all that is kept has been told? */
+static bool will_be_down(const es_window* window, const window_event* event)
+{
+    for (uint32_t i = window->event_count; i-- > 0;) {
+        const window_event* earlier = &window->events[(window->first_event + i) % RING];
+        if (earlier->kind == event->kind && earlier->what == event->what && earlier->action != GLFW_REPEAT) return earlier->action == GLFW_PRESS;
+    }
+    return event->kind == EVENT_KEY ? window->input.down[event->what] : window->input.mouse_down[event->what];
+}
+
+/* No key stays down because its release was one too many: beyond EVENTS there is room for one of each press that is kept, or was told. */
 static void keep_event(es_window* window, window_event event)
 {
-    if (window->event_count < EVENTS) window->events[(window->first_event + window->event_count++) % EVENTS] = event;
+    const bool release = event.kind != EVENT_CHARACTER && event.action == GLFW_RELEASE;
+    if (window->event_count >= EVENTS && !(release && will_be_down(window, &event))) return;
+    if (window->event_count < RING) window->events[(window->first_event + window->event_count++) % RING] = event;
 }
 
 static void on_key(GLFWwindow* glfw, int key, int scan_code, int action, int modifiers)
@@ -193,7 +206,7 @@ static void tell_events(es_window* window)
         if (is_press(event) && pressed) break;
         pressed |= is_press(event);
         tell_event(&window->input, event);
-        window->first_event = (window->first_event + 1) % EVENTS;
+        window->first_event = (window->first_event + 1) % RING;
         window->event_count--;
     }
     window->input.more = window->event_count > 0;
