@@ -71,7 +71,7 @@ static int check_row_id(const char* id)
         ids[i] = rows[i].id;
     }
     const char* nearest = demo_nearest(id, ids, count);
-    return demo_refuse("--only %s: no such row%s%s", id, nearest ? "; did you mean " : "", nearest ? nearest : "");
+    return demo_refuse("--only %s: no such row%s%s%s", id, nearest ? "; did you mean " : "", nearest ? nearest : "", nearest ? "?" : "");
 }
 
 static int refuse_name(const char* name)
@@ -114,8 +114,8 @@ int demo_bench(int count, char** arguments)
         while (option < OPTIONS && strcmp(argument, known[option]) != 0) option++;
         if (option == OPTIONS) {
             const char* nearest = demo_nearest(argument, known, OPTIONS);
-            return demo_refuse("bench: unknown option %s; %s%s", argument, nearest ? "did you mean " : "`earthshine help` lists all",
-                nearest ? nearest : "");
+            return demo_refuse("bench: unknown option %s; %s%s%s", argument, nearest ? "did you mean " : "`earthshine help` lists all",
+                nearest ? nearest : "", nearest ? "?" : "");
         }
         if (option == NO_PEER) options.no_peer = true;
         if (option == QUICK) options.quick = true;

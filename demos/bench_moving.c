@@ -74,7 +74,7 @@ static bool all_skipped(const es_renderer* renderer)
     return true;
 }
 
-typedef struct still_times { double settled, unsettled; uint32_t frames; } still_times;
+typedef struct still_times { double settled, unsettled; uint32_t frames; bool done; } still_times;
 
 /* Frames that stand still until nothing is left to do, and those after. */
 static es_result time_still(es_world* world, es_renderer* renderer, still_times* still)
@@ -82,9 +82,9 @@ static es_result time_still(es_world* world, es_renderer* renderer, still_times*
     double times[MOST_UNSETTLED];
     still->frames = 0;
     es_result result = ES_OK;
-    for (bool done = false; !done && still->frames < MOST_UNSETTLED && !result; done = !result && all_skipped(renderer)) result = time_frame(world, renderer, 0.0f, &times[still->frames++]);
+    for (; !still->done && still->frames < MOST_UNSETTLED && !result; still->done = !result && all_skipped(renderer)) result = time_frame(world, renderer, 0.0f, &times[still->frames++]);
     still->unsettled = bench_median(times, still->frames);
-    return result ? result : time_frames(world, renderer, 0.0f, 0, &still->settled);
+    return result || !still->done ? result : time_frames(world, renderer, 0.0f, 0, &still->settled);
 }
 
 /* Medians of a moving scene's frames and of the same standing still. */
@@ -124,15 +124,18 @@ int bench_moving(const bench_options* options)
         if (!bench_wants(options, works[i].id) && !of_still) continue;
         double moving[MAX_RUNS], ratios[MAX_RUNS];
         const uint32_t runs = options->quick ? 1 : options->runs;
+        bool unsettled = false;
         for (uint32_t r = 0; r < runs && !result; r++) {
-            still_times still = {NAN, NAN, 0};
+            still_times still = {NAN, NAN, 0, false};
             result = measure(context, &works[i], &moving[r], &still);
             ratios[r] = still.settled / moving[r];
-            if (of_still) snprintf(rows[WORKS].note, sizeof rows[WORKS].note, "%.3g ms, settled after %u frames of %.3g ms; in motion %.3g ms", still.settled, still.frames, still.unsettled, moving[r]);
+            unsettled |= !still.done;
+            if (of_still && unsettled) snprintf(rows[WORKS].note, sizeof rows[WORKS].note, "not settled within %d frames of %.3g ms; in motion %.3g ms", MOST_UNSETTLED, still.unsettled, moving[r]);
+            else if (of_still) snprintf(rows[WORKS].note, sizeof rows[WORKS].note, "%.3g ms, settled after %u frames of %.3g ms; in motion %.3g ms", still.settled, still.frames, still.unsettled, moving[r]);
         }
         if (result) break;
         rows[i].value = bench_median(moving, runs);
-        if (of_still) rows[WORKS].value = bench_median(ratios, runs);
+        if (of_still && !unsettled) rows[WORKS].value = bench_median(ratios, runs);
     }
     if (result) {
         int code = demo_refuse_context(context);

@@ -16,7 +16,7 @@ int demo_refuse(const char* format, ...) ES_PRINTF(1, 2);
 int demo_refuse_context(const es_context* context);
 /* Warnings to stderr; errors are left to demo_refuse_context, which knows that the command ends. */
 es_logger demo_logger(void);
-/* The candidate with the least edit distance to `name`, NULL when none is near. */
+/* The candidate with the least edit distance to `name`, NULL when none is within a third of its length. */
 const char* demo_nearest(const char* name, const char* const* candidates, size_t count);
 
 /* ---- options (options.c) ----------------------------------------------------------------------------------------- */

@@ -95,6 +95,6 @@ int main(int count, char** arguments)
     const char* names[COMMAND_COUNT];
     for (int i = 0; i < COMMAND_COUNT; i++) names[i] = commands[i].name;
     const char* nearest = demo_nearest(name, names, COMMAND_COUNT);
-    return demo_refuse(
-        "unknown command %s; %s%s", name, nearest ? "did you mean " : "`earthshine help` lists all", nearest ? nearest : "");
+    if (nearest) return demo_refuse("unknown command %s; did you mean %s?", name, nearest);
+    return demo_refuse("unknown command %s; `earthshine help` lists all", name);
 }

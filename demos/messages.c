@@ -51,15 +51,24 @@ static size_t edit_distance(const char* a, const char* b)
     return row[m];
 }
 
+/* "vpls" for what begins with "vpl.": the name of a group, for its first setting. */
+static bool names_group(const char* name, const char* candidate)
+{
+    size_t length = strcspn(candidate, ".");
+    return candidate[length] && strncmp(name, candidate, length) == 0 && !strcmp(name + length, "s");
+}
+
 const char* demo_nearest(const char* name, const char* const* candidates, size_t count)
 {
     const char* nearest = NULL;
-    size_t least = strlen(name) / 2 + 2; /* farther away it is another word */
+    const size_t length = strlen(name + strspn(name, "-"));
+    size_t least = (length + 2) / 3 + 1; /* farther away than a third it is another word */
     for (size_t i = 0; i < count; i++) {
         size_t distance = edit_distance(name, candidates[i]);
         /* The part behind a group's prefix alone is a common slip: "size" for "ism.size". */
         const char* tail = strrchr(candidates[i], '.');
         if (tail && edit_distance(name, tail + 1) + 1 < distance) distance = edit_distance(name, tail + 1) + 1;
+        if (names_group(name, candidates[i])) distance = 0;
         if (distance < least) {
             least = distance;
             nearest = candidates[i];

@@ -191,7 +191,7 @@ int demo_settings(int count, char** arguments)
 int demo_scenes(int count, char** arguments)
 {
     bool settings = count > 0 && (!strcmp(arguments[0], "-v") || !strcmp(arguments[0], "--settings"));
-    if (expect_nothing("scenes", count - settings, arguments + settings) != DEMO_OK) return DEMO_BAD_INPUT;
+    if (count > settings) return demo_refuse("scenes: takes no arguments but --settings, there is %s", arguments[settings]);
     for (size_t i = 0; i < es_scene_count(); i++) {
         const char* name = es_scene_name(i);
         printf("%-15s %s\n", name, es_scene_description(i));

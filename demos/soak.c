@@ -13,7 +13,7 @@ typedef struct soak {
     double seconds;
     uint32_t threads;
     bool no_sleep;
-    double peak;          /* J: most kinetic energy of bodies and cloth together, after the first half */
+    double peak;          /* J: most kinetic energy of bodies and cloth together, after the first half; negative: that was not reached */
     uint32_t bodies, softs;
     float low[3], high[3]; /* of what there was to see when it began */
     char trouble[256];
@@ -94,10 +94,12 @@ static void look_at_gain(soak* s, const es_world* world, const energy_watch* wat
         gain.id, name && name[0] ? ", " : "", name ? name : "", gain.joules, gain.allowed);
 }
 
-static void report(const soak* s, const energy_gain* gain, double rate)
+/* `made` seconds took `spent`. */
+static void report(const soak* s, const energy_gain* gain, double made, uint64_t steps, double spent)
 {
     const double judged = (double)gain->judged / (double)(gain->judged + gain->driven ? gain->judged + gain->driven : 1);
-    printf("%-14s %5u bodies %3u soft bodies, %g s, %.0f steps per second, kinetic energy at most %.4g J in the second half, ", s->scene, s->bodies, s->softs, s->seconds, rate, s->peak);
+    printf("%-14s %5u bodies %3u soft bodies, %.6g s, %.0f steps per second, ", s->scene, s->bodies, s->softs, made, (double)steps / spent);
+    if (s->peak >= 0) printf("kinetic energy at most %.4g J in the second half, ", s->peak);
     if (gain->judged) printf("gained by nothing at most %.3g J (%.1f %% of what is allowed; judged %.1f %% of all)", gain->joules, 100 * gain->joules / gain->allowed, 100 * judged);
     else printf("everything driven or nothing there");
     printf(": %s\n", s->trouble[0] ? s->trouble : "good");
@@ -134,9 +136,12 @@ static int run(soak* s)
     memcpy(s->high, &high, sizeof s->high);
     const double begin = demo_seconds(), rate = 1 / (double)settings.step;
     const uint64_t steps = (uint64_t)(s->seconds * rate);
+    uint64_t made = 0;
+    s->peak = -1;
     for (uint64_t i = 0; i < steps && code == DEMO_OK && !s->trouble[0]; i++) {
         if (es_world_step(session.world, settings.step) != ES_OK) code = demo_refuse_context(session.context);
         else if (!energy_watch_step(watch, session.world)) code = demo_refuse("out of memory");
+        made = code == DEMO_OK ? i + 1 : i;
         if (code != DEMO_OK || (i % LOOK && i + 1 < steps)) continue;
         const double time = (double)(i + 1) / rate;
         const double energy = look_at_bodies(s, session.world, ids, time) + look_at_softs(s, session.world, ids, time);
@@ -147,7 +152,7 @@ static int run(soak* s)
     free(ids);
     const energy_gain gain = watch ? energy_watch_worst(watch) : (energy_gain){0};
     energy_watch_close(watch);
-    if (code == DEMO_OK) report(s, &gain, (double)steps / (demo_seconds() - begin));
+    if (code == DEMO_OK) report(s, &gain, made == steps ? s->seconds : (double)made / rate, made, demo_seconds() - begin);
     demo_session_close(&session);
     return code == DEMO_OK && s->trouble[0] ? DEMO_EXCEEDED : code;
 }
@@ -158,7 +163,6 @@ int demo_soak(int count, char** arguments)
     soak asked = {.seconds = 3600};
     for (int i = 0; i < count; i++) {
         const char* value = i + 1 < count ? arguments[i + 1] : NULL;
-        uint32_t threads;
         if (!strcmp(arguments[i], "--no-sleep")) {
             asked.no_sleep = true;
             continue;
@@ -166,10 +170,9 @@ int demo_soak(int count, char** arguments)
         if (!value) return demo_refuse("soak: %s: no such option, or its value is missing; --scene S|all --seconds S --threads N --no-sleep", arguments[i]);
         if (!strcmp(arguments[i], "--scene")) scene = value;
         else if (!strcmp(arguments[i], "--seconds")) {
-            if (!demo_parse_double(value, 0.1, 1e6, &asked.seconds)) return demo_refuse("--seconds %s: must be a number from 0.1 to 1e6", value);
+            if (!demo_parse_double(value, 0.1, 1e6, &asked.seconds)) return demo_refuse("--seconds %s: a number from 0.1 to 1e6 is expected", value);
         } else if (!strcmp(arguments[i], "--threads")) {
-            if (!demo_parse_uint(value, 1, 1024, &threads)) return demo_refuse("--threads %s: must be a whole number from 1 to 1024", value);
-            asked.threads = threads;
+            if (!demo_parse_uint(value, 1, 64, &asked.threads)) return demo_refuse("--threads %s: a number from 1 to 64 is expected", value);
         } else return demo_refuse("soak: unknown option %s; --scene S|all --seconds S --threads N --no-sleep", arguments[i]);
         i++;
     }

@@ -214,10 +214,11 @@ static void choose_clips(es_world* world)
 es_result es_world_finish_opening(es_world* world)
 {
     uint32_t cameras = world->slots[ES_OBJECT_CAMERA].live, clips = world->slots[ES_OBJECT_CLIP].live;
+    if (cameras == 1 && world->settings.camera > 0) return es_fail(world->context, ES_SETTING_VALUE, "setting world.camera: %u; there is camera 0 alone", world->settings.camera);
     if (cameras && world->settings.camera >= cameras)
         return es_fail(world->context, ES_SETTING_VALUE, "setting world.camera: %u; there are cameras 0 … %u", world->settings.camera, cameras - 1);
     if (world->settings.clip > clips)
-        return es_fail(world->context, ES_SETTING_VALUE, "setting world.clip: %u; there are %u clips", world->settings.clip, clips);
+        return es_fail(world->context, ES_SETTING_VALUE, "setting world.clip: %u; there %s %u clip%s", world->settings.clip, clips == 1 ? "is" : "are", clips, clips == 1 ? "" : "s");
     for (uint32_t slot = 0, number = 0; slot < world->slots[ES_OBJECT_CAMERA].slot_count; slot++) {
         const es_object* camera = es_slots_at(&world->slots[ES_OBJECT_CAMERA], slot);
         if (camera && number++ == world->settings.camera) es_world_set_active_camera(world, (es_camera){camera->id});
