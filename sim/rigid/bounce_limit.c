@@ -15,7 +15,7 @@
 #include <string.h>
 
 #include "platform/maths.h"
-#include "sim/rigid/rigid.h"
+#include "sim/rigid/joints.h"
 
 typedef struct motion { double v[3], w[3]; } motion; /* w along the body's own axes */
 
@@ -54,16 +54,27 @@ static void meet_wall(const es_solver_bodies* bodies, es_bounce_island* island, 
     island->walled = true;
 }
 
-static void meet_walls(const es_world* world, const es_solver_bodies* bodies, es_bounce_island* islands)
+/* Islands from the solver's own list of who touches whom, which is shorter to go through than the world's; the walls of each after all have joined. */
+static void find_islands(es_world* world, const es_solver_job* job, uint32_t contact_count, es_bounce_island* islands)
 {
-    const es_contacts* contacts = &world->rigid->contacts;
-    for (size_t i = 0; i < contacts->count; i++) {
-        if (!contacts->list[i].count) continue;
-        uint32_t a = es_body_of_key(world, contacts->list[i].a)->index, b = es_body_of_key(world, contacts->list[i].b)->index;
-        if (a == UINT32_MAX) a = bodies->still;
-        if (b == UINT32_MAX) b = bodies->still;
-        if (a < bodies->dynamic && b >= bodies->dynamic) meet_wall(bodies, &islands[es_island_of(world, a)], b);
-        if (b < bodies->dynamic && a >= bodies->dynamic) meet_wall(bodies, &islands[es_island_of(world, b)], a);
+    const es_solver_bodies* bodies = &job->bodies;
+    uint32_t* parents = world->rigid->parents;
+    for (uint32_t i = 0; i < bodies->dynamic; i++) parents[i] = i;
+    for (uint32_t i = 0; i < contact_count; i++) {
+        const es_wide_contact* c = &job->contacts[i];
+        for (uint32_t lane = 0; lane < c->used; lane++)
+            if (c->a[lane] < bodies->dynamic && c->b[lane] < bodies->dynamic) es_island_join(parents, c->a[lane], c->b[lane]);
+    }
+    es_joints_unite(world, parents, es_island_join);
+    for (uint32_t i = 0; i < bodies->dynamic; i++) parents[i] = es_island_root(parents, i);
+    memset(islands, 0, bodies->dynamic * sizeof *islands);
+    for (uint32_t i = 0; i < contact_count; i++) {
+        const es_wide_contact* c = &job->contacts[i];
+        for (uint32_t lane = 0; lane < c->used; lane++) {
+            const uint32_t a = c->a[lane], b = c->b[lane];
+            if (a < bodies->dynamic && b >= bodies->dynamic) meet_wall(bodies, &islands[parents[a]], b);
+            if (b < bodies->dynamic && a >= bodies->dynamic) meet_wall(bodies, &islands[parents[b]], a);
+        }
     }
 }
 
@@ -72,7 +83,8 @@ static void sum(const es_world* world, const es_solver_bodies* bodies, const flo
 {
     const es_body_object* body = es_slots_at(&world->slots[ES_OBJECT_BODY], world->rigid->moving[i]);
     const float *kept = before + 8 * (size_t)i, *now = bodies->velocity + 8 * (size_t)i, *moved = bodies->moved + 8 * (size_t)i;
-    motion first = motion_of(body, &body->velocity.x, &body->angular_velocity.x), from = motion_of(body, kept, kept + 4), to = motion_of(body, now, now + 4), change;
+    const bool bounced = has_bounced(bodies, before, i);
+    motion first = motion_of(body, &body->velocity.x, &body->angular_velocity.x), from = motion_of(body, kept, kept + 4), to = bounced ? motion_of(body, now, now + 4) : from, change;
     for (int k = 0; k < 3; k++) {
         const double frame = (double)island->frame[k], force = (double)(&body->force.x)[k] + (double)body->mass * (double)(&world->settings.gravity.x)[k] * (double)body->gravity_scale;
         change.v[k] = to.v[k] - from.v[k];
@@ -83,6 +95,7 @@ static void sum(const es_world* world, const es_solver_bodies* bodies, const flo
     }
     island->allowed += product(body, &first, &first);
     island->constant += product(body, &from, &from);
+    if (!bounced) return;
     island->linear += 2 * product(body, &from, &change);
     island->square += product(body, &change, &change);
 }
@@ -96,23 +109,23 @@ static double largest_share(const es_bounce_island* island)
     return share > 0 ? share < 1 ? share : 1 : 0;
 }
 
-void es_limit_bounces(es_world* world, const es_solver_bodies* bodies, const float* before, es_bounce_island* islands, float h)
+void es_limit_bounces(es_world* world, const es_solver_job* job, uint32_t contact_count, const float* before, es_bounce_island* islands, float h)
 {
+    const es_solver_bodies* bodies = &job->bodies;
+    const uint32_t* parents = world->rigid->parents;
     uint32_t first = 0;
     while (first < bodies->dynamic && !has_bounced(bodies, before, first)) first++;
     if (first == bodies->dynamic) return;
-    es_find_islands(world);
-    memset(islands, 0, bodies->dynamic * sizeof *islands);
-    meet_walls(world, bodies, islands);
+    find_islands(world, job, contact_count, islands);
     for (uint32_t i = first; i < bodies->dynamic; i++)
-        if (has_bounced(bodies, before, i)) islands[es_island_of(world, i)].bounced = true;
+        if (has_bounced(bodies, before, i)) islands[parents[i]].bounced = true;
     for (uint32_t i = 0; i < bodies->dynamic; i++) {
-        es_bounce_island* island = &islands[es_island_of(world, i)];
+        es_bounce_island* island = &islands[parents[i]];
         if (island->bounced && !island->driven) sum(world, bodies, before, i, h, island);
     }
     for (uint32_t i = 0; i < bodies->dynamic; i++) islands[i].share = islands[i].bounced ? largest_share(&islands[i]) : 1;
     for (uint32_t i = first; i < bodies->dynamic; i++) {
-        const double share = islands[es_island_of(world, i)].share;
+        const double share = islands[parents[i]].share;
         if (share == 1 || !has_bounced(bodies, before, i)) continue;
         float* now = bodies->velocity + 8 * (size_t)i;
         const float* from = before + 8 * (size_t)i;

@@ -11,8 +11,8 @@ typedef struct es_bounce_island { /* by the number of its first body; twice the 
     bool bounced, walled, driven;             /* walled: something does; driven: in more ways than that */
 } es_bounce_island;
 
-/* Between the bounces and es_solver's last stages. before: the bodies' velocities when the bounces began, as bodies->velocity; islands: room for
- * one per dynamic body; h: of the step, s. Uses rigid->parents. */
-void es_limit_bounces(es_world* world, const es_solver_bodies* bodies, const float* before, es_bounce_island* islands, float h);
+/* After the bounces, before anything is stored. contact_count: of job->contacts; before: the bodies' velocities when the bounces began, as
+ * job->bodies.velocity; islands: room for one per dynamic body; h: of the step, s. Uses rigid->parents. */
+void es_limit_bounces(es_world* world, const es_solver_job* job, uint32_t contact_count, const float* before, es_bounce_island* islands, float h);
 
 #endif

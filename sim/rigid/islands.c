@@ -81,7 +81,7 @@ bool es_sort_contacts(es_world* world)
 /* ---- falling asleep --------------------------------------------------------------------------------------------------------- */
 
 /* Roots are the least of their island, so that the numbering depends on who is joined alone. */
-static uint32_t root_of(uint32_t* parents, uint32_t i)
+uint32_t es_island_root(uint32_t* parents, uint32_t i)
 {
     while (parents[i] != i) {
         parents[i] = parents[parents[i]];
@@ -90,10 +90,10 @@ static uint32_t root_of(uint32_t* parents, uint32_t i)
     return i;
 }
 
-static void join(uint32_t* parents, uint32_t a, uint32_t b)
+void es_island_join(uint32_t* parents, uint32_t a, uint32_t b)
 {
-    a = root_of(parents, a);
-    b = root_of(parents, b);
+    a = es_island_root(parents, a);
+    b = es_island_root(parents, b);
     if (a < b) parents[b] = a;
     else parents[a] = b;
 }
@@ -105,22 +105,6 @@ bool es_islands_reserve(es_world* world)
     return es_grow(world->context, (void**)&rigid->parents, &rigid->parent_capacity, 0, count, sizeof *rigid->parents) &&
            es_grow(world->context, (void**)&rigid->stillness, &rigid->stillness_capacity, 0, count, sizeof *rigid->stillness);
 }
-
-void es_find_islands(es_world* world)
-{
-    es_rigid* rigid = world->rigid;
-    uint32_t* parents = rigid->parents;
-    for (uint32_t i = 0; i < rigid->dynamic_count; i++) parents[i] = i;
-    for (size_t i = 0; i < rigid->contacts.count; i++) {
-        const es_contact* contact = &rigid->contacts.list[i];
-        if (!contact->count) continue;
-        const es_body_object *a = es_body_of_key(world, contact->a), *b = es_body_of_key(world, contact->b);
-        if (a->type == ES_BODY_DYNAMIC && b->type == ES_BODY_DYNAMIC) join(parents, a->index, b->index);
-    }
-    es_joints_unite(world, parents, join);
-}
-
-uint32_t es_island_of(const es_world* world, uint32_t i) { return root_of(world->rigid->parents, i); }
 
 void es_islands_sleep(es_world* world, float h)
 {
@@ -137,16 +121,23 @@ void es_islands_sleep(es_world* world, float h)
     const uint32_t count = rigid->dynamic_count;
     uint32_t* parents = rigid->parents;
     float* stillness = rigid->stillness;
-    es_find_islands(world);
+    for (uint32_t i = 0; i < count; i++) parents[i] = i;
+    for (size_t i = 0; i < rigid->contacts.count; i++) {
+        const es_contact* contact = &rigid->contacts.list[i];
+        if (!contact->count) continue;
+        const es_body_object *a = es_body_of_key(world, contact->a), *b = es_body_of_key(world, contact->b);
+        if (a->type == ES_BODY_DYNAMIC && b->type == ES_BODY_DYNAMIC) es_island_join(parents, a->index, b->index);
+    }
+    es_joints_unite(world, parents, es_island_join);
     for (uint32_t i = 0; i < count; i++) stillness[i] = 1e30f;
     for (uint32_t i = 0; i < count; i++) {
         const es_body_object* body = es_slots_at(slots, rigid->moving[i]);
-        uint32_t root = root_of(parents, i);
+        uint32_t root = es_island_root(parents, i);
         stillness[root] = es_minf(stillness[root], body->still);
     }
     for (uint32_t i = 0; i < count; i++) {
         es_body_object* body = es_slots_at(slots, rigid->moving[i]);
-        uint32_t root = root_of(parents, i);
+        uint32_t root = es_island_root(parents, i);
         if (stillness[root] < ES_SLEEP_SECONDS) continue;
         body->asleep = true;
         body->island = rigid->moving[root];

@@ -175,12 +175,11 @@ void es_body_wake(es_world* world, es_body_object* body); /* and its island */
 void es_body_wake_neighbours(es_world* world, es_body_object* body);
 /* Puts each contact on the list where it belongs. False after es_fail. */
 bool es_sort_contacts(es_world* world);
-/* Memory for the next three, before bodies move; false after es_fail. */
+/* Memory for rigid->parents and the next, before bodies move; false after es_fail. */
 bool es_islands_reserve(es_world* world);
-/* Into rigid->parents, by bodies' numbers among the solver's: what hangs together. */
-void es_find_islands(es_world* world);
-/* Then: the least number of a body of the same island as the dynamic body i. */
-uint32_t es_island_of(const es_world* world, uint32_t i);
+/* Of parents[i] = i first; the root of an island is its least number, in whatever order bodies were joined. */
+uint32_t es_island_root(uint32_t* parents, uint32_t i);
+void es_island_join(uint32_t* parents, uint32_t a, uint32_t b);
 /* After a step: islands that have been still long enough fall asleep. */
 void es_islands_sleep(es_world* world, float h);
 

@@ -296,7 +296,7 @@ static void run_block(void* user, uint32_t kind, uint32_t begin, uint32_t end)
     case RELAX: kernels->contacts_relax(job, begin, end); break;
     case KEEP: memcpy(solver->unbounced + 8 * (size_t)begin, solver->velocity + 8 * (size_t)begin, 8 * (size_t)(end - begin) * sizeof(float)); break;
     case BOUNCE: kernels->contacts_bounce(job, begin, end); break;
-    case LIMIT_BOUNCES: es_limit_bounces(solver->world, &job->bodies, solver->unbounced, solver->islands, solver->h); break;
+    case LIMIT_BOUNCES: es_limit_bounces(solver->world, job, solver->first[ES_COLOURS + 1], solver->unbounced, solver->islands, solver->h); break;
     case STORE_JOINTS: es_joints_store(solver->world, job); break;
     case STORE: kernels->contacts_store(job, begin, end); break;
     case UNLOAD:
