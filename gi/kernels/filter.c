@@ -68,7 +68,8 @@ static void fold(const sweep* w, uint32_t p, float* line, float nothing)
         if (x == 0) x = width; /* the left side is done */
         if (x >= to) break;
         const int64_t place = folded(x, width, n);
-        line[x - w->left] = place >= from && place < to ? line[place - w->left] : nothing;
+        /* -1 is no place, though it may lie within the block's margin */
+        line[x - w->left] = place >= 0 && place >= from && place < to ? line[place - w->left] : nothing;
     }
 }
 
@@ -140,7 +141,8 @@ VINL vm alike(const sweep* w, uint32_t line, uint32_t at, uint32_t line2, uint32
 static void find_even(const sweep* w, uint32_t y, bool first)
 {
     es_filter_scratch* s = w->s;
-    const uint32_t line = y & w->ring, above = (y - 1) & w->ring, groups = reads_to(w, 0) / VW, n = w->job->size;
+    /* the first line has none above it; compilers may subtract before they ask whether it has, and fresh memory may hold anything */
+    const uint32_t line = y & w->ring, above = first ? line : (y - 1) & w->ring, groups = reads_to(w, 0) / VW, n = w->job->size;
     /* window of eight pixels: n + 7 columns, of which the first is n / 2 before theirs */
     const uint32_t pairs = ((1u << (n + 6)) - 1u) << (8 - n / 2);
     uint32_t bits[ES_FILTER_GROUPS + 2] = {0}; /* neighbours to the right that pass */
