@@ -12,23 +12,11 @@
 
 #include "gi/kernel_table.h"
 #include "platform/random.h"
+#include "tests/guarded_planes.h"
 
 static uint32_t counter;
 static uint32_t random_bits(void) { return es_random_u32(47, counter++); }
 static float uniform(float low, float high) { return low + (high - low) * es_unit_float(random_bits()); }
-
-enum { GUARD = 64 };
-static const uint32_t guard_word = 0xdeadbeef;
-
-typedef struct plane { uint32_t* memory; size_t count; } plane;
-static plane new_plane(size_t count)
-{
-    plane p = {malloc((count + 2 * GUARD) * 4), count};
-    assert_non_null(p.memory);
-    for (size_t i = 0; i < count + 2 * GUARD; i++) p.memory[i] = guard_word;
-    return p;
-}
-static float* at(plane p) { return (float*)(p.memory + GUARD); }
 
 typedef struct setup { es_gbuffer g; plane motion_x, motion_y, surface, source[3], history[3]; es_antialias_job job; } setup;
 
@@ -82,11 +70,7 @@ static void resolve(setup* s, es_isa isa, uint32_t rows, plane result[3])
         s->job.result[k] = at(result[k]);
     }
     for (uint32_t y = 0; y < s->g.height; y += rows) es_gi_kernel_table(isa)->antialias(&s->job, y, y + rows < s->g.height ? y + rows : s->g.height);
-    for (int k = 0; k < 3; k++)
-        for (size_t i = 0; i < GUARD; i++) {
-            assert_int_equal(result[k].memory[i], guard_word);
-            assert_int_equal(result[k].memory[GUARD + result[k].count + i], guard_word);
-        }
+    for (int k = 0; k < 3; k++) check_guards(result[k]);
 }
 static void free_planes(plane planes[3])
 {

@@ -20,31 +20,12 @@
 #include "platform/maths.h"
 #include "platform/random.h"
 #include "raster/pack.h"
+#include "tests/guarded_planes.h"
 
 static uint32_t counter;
 static uint32_t random_bits(void) { return es_random_u32(29, counter++); }
 static float uniform(float low, float high) { return low + (high - low) * es_unit_float(random_bits()); }
 
-enum { GUARD = 64 };
-static const uint32_t guard_word = 0xdeadbeef;
-
-typedef struct plane { uint32_t* memory; size_t count; } plane;
-
-static plane new_plane(size_t count)
-{
-    plane p = {malloc((count + 2 * GUARD) * 4), count};
-    assert_non_null(p.memory);
-    for (size_t i = 0; i < count + 2 * GUARD; i++) p.memory[i] = guard_word;
-    return p;
-}
-static float* at(plane p) { return (float*)(p.memory + GUARD); }
-static void check_guards(plane p)
-{
-    for (size_t i = 0; i < GUARD; i++) {
-        assert_int_equal(p.memory[i], guard_word);
-        assert_int_equal(p.memory[GUARD + p.count + i], guard_word);
-    }
-}
 /* the pixels, not the padding of the rows; any two NaNs are equal */
 static void check_equal(const es_gbuffer* g, plane a, plane b, const char* what)
 {

@@ -75,18 +75,24 @@ static void creeping(void** unused)
     free_arena(&a);
 }
 
+/* Six walls without friction that give everything back, a metre thick, their middles `middle` metres from the origin. */
+static void add_smooth_walls(arena* a, double middle)
+{
+    for (int k = 0; k < 6; k++) {
+        es_shape_desc wall = box_shape(k / 2 == 0 ? 0.5f : 2, k / 2 == 1 ? 0.5f : 2, k / 2 == 2 ? 0.5f : 2);
+        wall.restitution = 1;
+        wall.friction = 0;
+        const double at = k % 2 ? middle : -middle;
+        add_body(a, ES_BODY_STATIC, &wall, k / 2 == 0 ? at : 0, k / 2 == 1 ? at : 0, k / 2 == 2 ? at : 0, no_turn);
+    }
+}
+
 /* Boxes and balls that lose nothing when they bounce, off walls and each other, fast and spinning. */
 static void bouncing(void** unused)
 {
     arena a = make_arena(1, 0, false);
     set_gravity(&a, 0, 0, 0);
-    for (int k = 0; k < 6; k++) {
-        es_shape_desc wall = box_shape(k / 2 == 0 ? 0.5f : 2, k / 2 == 1 ? 0.5f : 2, k / 2 == 2 ? 0.5f : 2);
-        wall.restitution = 1;
-        wall.friction = 0;
-        const double at = k % 2 ? 1.5 : -1.5;
-        add_body(&a, ES_BODY_STATIC, &wall, k / 2 == 0 ? at : 0, k / 2 == 1 ? at : 0, k / 2 == 2 ? at : 0, no_turn);
-    }
+    add_smooth_walls(&a, 1.5);
     double before = 0, after = 0;
     es_body bodies[8];
     for (int i = 0; i < 8; i++) {
@@ -166,13 +172,7 @@ static void crowd(void** unused)
 {
     arena a = make_arena(1, 0, false);
     set_gravity(&a, 0, 0, 0);
-    for (int k = 0; k < 6; k++) {
-        es_shape_desc wall = box_shape(k / 2 == 0 ? 0.5f : 2, k / 2 == 1 ? 0.5f : 2, k / 2 == 2 ? 0.5f : 2);
-        wall.restitution = 1;
-        wall.friction = 0;
-        const double at = k % 2 ? 1.0 : -1.0;
-        add_body(&a, ES_BODY_STATIC, &wall, k / 2 == 0 ? at : 0, k / 2 == 1 ? at : 0, k / 2 == 2 ? at : 0, no_turn);
-    }
+    add_smooth_walls(&a, 1.0);
     es_body cubes[8];
     double before = 0, last = 0;
     for (int i = 0; i < 8; i++) {
