@@ -12,7 +12,8 @@
  * What a group gains is charged to its members by what each is allowed, and what it loses is taken off again, but never below nothing; so a small gain in
  * each window adds up, and trembling about a mean does not. A member that was driven begins anew. Contacts that give way a little store and
  * return energy that is not seen here, so each member is allowed that of ENERGY_HEIGHT m of height under 9.81 m/s² (soft bodies:
- * ENERGY_SOFT_HEIGHT); bounces without loss are solved to some percent, so ENERGY_SHARE of the most kinetic energy it had since it was driven. */
+ * ENERGY_SOFT_HEIGHT). What the solver gains before bounces are limited, 2.2 J of 2900 J in 200 s of the scene `stress`, is not traced yet:
+ * ENERGY_SHARE of the most kinetic energy it had since it was driven is allowed for it. */
 #ifndef EARTHSHINE_DEMO_ENERGY_WATCH_H
 #define EARTHSHINE_DEMO_ENERGY_WATCH_H
 

@@ -8,7 +8,7 @@
 uint64_t es_view_pose_hash(const es_raster_view* view);
 
 /* Of all that drawing depends on but the pose and the materials' contents: the instances that es_draw_gbuffer and es_draw_depth would not cull,
- * in their order. Twelve dozen multiplications an instance. */
+ * in their order. It costs what culling them does. */
 uint64_t es_view_content_hash(const es_draw_list* list, const es_raster_view* view);
 
 #endif
