@@ -1,0 +1,84 @@
+/* The scene as a hierarchy of points (Ritschel thesis §6.2.1): what micro-buffers are drawn from.
+ *
+ * Each instance of the draw list has a tree of its own, in its local space: the world transform is M = Q U, Q orthogonal with the translation and U
+ * upper triangular (stretches and shears). Points stand in the space after U, lengths are metres there as in the world, and an instance that
+ * moves rigidly changes its Q and nothing else. Double-sided materials have two trees, one for each side; of single-sided surfaces only the front
+ * is there.
+ *
+ * A tree is complete and binary, of a power of two of leaves, split at the median of the longest axis. Its nodes stand in the forest's arrays from
+ * `first` on, as in a heap: node 1 is the root, node i has children 2i and 2i + 1, and the leaves are nodes leaf_count … 2 leaf_count - 1 (slot 0
+ * is not used). A leaf is a disc; an inner node is the sphere about its children's, the cone of their normals and their mean light.
+ *
+ * Above the trees is a tree of trees, complete too, in world space: its leaves are the trees' roots, padded with nodes of negative radius. */
+#ifndef EARTHSHINE_GI_MICRO_FOREST_H
+#define EARTHSHINE_GI_MICRO_FOREST_H
+
+#include "gi/gi.h"
+
+/* 128 bits (§6.3.1). Decoded: centre = low + step · position, radius = radius_step · radius, never less than what it was made from together with
+ * the centre's rounding. */
+typedef struct es_point_node {
+    uint16_t position[3], radius;
+    uint32_t cone;             /* axis of the cone of normals, octahedral: x in bits 0 … 11, y in 12 … 23, each n as 2 n / 4095 - 1; bits 24 … 31: the sine of its
+                                * half angle over 254, rounded up with the axis' error; 255: wider than 90°, may face any way */
+    uint32_t radiance;         /* W/(m² sr) sent by its front, RGB9E5 (raster/pack.h) */
+} es_point_node;
+
+/* The same in floats, to compare with. */
+typedef struct es_point_node_float {
+    float position[3], radius;
+    float axis[3], sine;       /* sine 2: may face any way */
+} es_point_node_float;
+
+typedef struct es_point_tree {
+    uint32_t instance;         /* of the draw list */
+    bool back;                 /* of a double-sided instance's back */
+    uint32_t leaf_count;       /* a power of two */
+    size_t first;              /* of its nodes in the forest's */
+    size_t first_leaf;         /* of its leaves in the forest's: leaf k is node leaf_count + k */
+    float rotation[9];         /* Q: columns are the local axes in the world; may mirror */
+    float translation[3];
+    float low[3], step[3], radius_step; /* of the quantised nodes */
+} es_point_tree;
+
+typedef struct es_point_forest {
+    es_point_tree* trees;
+    uint32_t tree_count;
+    es_point_tree top;         /* the tree of trees: identity transform; `first` in the same arrays, no leaves of the leaves' arrays */
+    uint32_t* top_trees;       /* of each of its leaves: which tree; UINT32_MAX: padding */
+    size_t node_count, leaf_count;
+    /* of nodes */
+    es_point_node* nodes;
+    es_point_node_float* float_nodes; /* tree's local space; what the others are rounded from */
+    float* radiance[3];        /* W/(m² sr), the mean over the node's area */
+    float* area;               /* m² */
+    uint32_t* albedo;          /* RGB9E5: share of the irradiance that is reflected, lobe included, the mean over the area */
+    uint32_t* emission;        /* RGB9E5, W/(m² sr), likewise */
+    /* of leaves, in the trees' order; arrays are readable up to the next multiple of eight past leaf_count */
+    float *x, *y, *z;          /* world */
+    uint32_t* normal;          /* world, octahedral 2 × 16 bits as the G-buffer has it, of the side that the leaf is */
+    uint32_t *albedo_rg, *albedo_b, *surface; /* G-buffer words */
+    uint32_t *triangle, *barycentric;  /* as es_scene_points has them */
+    uint64_t version;          /* differs whenever anything above but light differs */
+    struct es_forest_private* own; /* what updates need (gi/micro/forest.c) */
+} es_point_forest;
+
+typedef struct es_forest_request {
+    uint32_t points;           /* of all trees together: at most; each tree has a power of two, by its area and the instance's point_weight */
+    float rebuild;             /* a deforming tree is split anew when the measure of gi/micro/forest.c passes this multiple of what it was after the split */
+} es_forest_request;
+
+typedef struct es_forest_update {
+    uint32_t built, refit, moved; /* trees split anew, of other vertices, of another transform */
+    uint64_t points;           /* leaves computed anew */
+} es_forest_update;
+
+/* Brings the forest up to the draw list and to the materials of that revision; what has not changed is left alone. Light is kept where the tree is, 0 where it
+ * is new. From all zero, or again. A list without area gives no trees. */
+es_result es_forest_bring(es_context* context, es_point_forest* forest, const es_draw_list* list, uint64_t materials, const es_forest_request* request, es_forest_update* update);
+void es_forest_free(es_context* context, es_point_forest* forest);
+
+/* Mean light of all inner nodes and of the tree of trees from the leaves' radiance, by area; packs it into the quantised nodes. (§6.4.3's pull) */
+void es_forest_pull(es_context* context, es_point_forest* forest);
+
+#endif

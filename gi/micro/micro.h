@@ -1,0 +1,41 @@
+/* Final gathering by micro-rendering (Ritschel thesis §6.2.2): the light that arrives at a point, or is reflected there by a lobe, from a picture of a few
+ * pixels a side whose every pixel is worth the same. */
+#ifndef EARTHSHINE_GI_MICRO_MICRO_H
+#define EARTHSHINE_GI_MICRO_MICRO_H
+
+#include "gi/micro/forest.h"
+
+enum { ES_MICRO_MIN_SIZE = 8, ES_MICRO_MAX_SIZE = 32 };
+
+typedef enum es_gather_kind {
+    ES_GATHER_DIFFUSE,     /* irradiance, what the interface does not let through left out (`pass` of gi/surface.h), W/m²: times albedo over pi it is what the diffuse part sends */
+    ES_GATHER_LOBE         /* radiance that the surface's lobe reflects towards the eye */
+} es_gather_kind;
+
+/* Where light is gathered. Of structures, so that they may be sorted. */
+typedef struct es_gather_point {
+    float position[3];     /* world */
+    float normal[3];       /* unit */
+    float view[3];         /* unit, to the eye; where the kind or the surface does not need it anything finite */
+    float f0[3];           /* es_surface.specular */
+    float roughness;       /* es_surface.roughness */
+    uint32_t model;        /* es_surface_model */
+    uint32_t kind;         /* es_gather_kind */
+    uint32_t seed;         /* of the frame's turn: any number, which should differ between neighbours */
+} es_gather_point;
+
+typedef struct es_micro_settings {
+    uint32_t size;         /* of the micro-buffers, pixels a side, 8 … 32, a multiple of 8 or 4 */
+    float cut;             /* a node is drawn when its solid angle is no more than this share of the pixel's it falls on */
+    bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn into one pixel */
+    bool warp;             /* pixels are distributed as the lobe is; off: as the cosine, and weighted */
+    bool quantised;        /* nodes of 128 bits; off: floats */
+} es_micro_settings;
+
+typedef struct es_micro_stats { uint64_t samples, visited, drawn, cast; } es_micro_stats; /* pixels of micro-buffers; node visits times points; nodes drawn; leaves met by rays */
+
+/* result[k][i] of point i. Points are gathered in groups along a space-filling curve, in parallel; what one gets does not depend on the others.
+ * stats may be NULL. */
+es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats);
+
+#endif
