@@ -19,8 +19,9 @@
  * the centre's rounding. */
 typedef struct es_point_node {
     uint16_t position[3], radius;
-    uint32_t cone;             /* axis of the cone of normals, octahedral: x in bits 0 … 11, y in 12 … 23, each n as 2 n / 4095 - 1; bits 24 … 31: the sine of its
-                                * half angle over 254, rounded up with the axis' error; 255: wider than 90°, may face any way */
+    uint32_t cone;             /* bits 0 … 9 and 10 … 19: axis of the cone of normals, octahedral, each n as 2 n / 1023 - 1; bits 20 … 25: s, the sine of its half
+                                * angle is at most s / 62, the axis' own error included, 63: wider than 90°, may face any way; bits 26 … 31: f, the slab's
+                                * half thickness is at most f / 63 of the radius: 0 is exactly flat, as the parts of a wall are */
     uint32_t radiance;         /* W/(m² sr) sent by its front, RGB9E5 (raster/pack.h) */
 } es_point_node;
 
@@ -28,6 +29,8 @@ typedef struct es_point_node {
 typedef struct es_point_node_float {
     float position[3], radius;
     float axis[3], sine;       /* sine 2: may face any way */
+    float slab;                /* all leaves' centres are within this of the plane through `position` across the axis, metres; of a node with leaves all
+                                * around it the radius. By it a wall is known to be invisible from its own plane, whole */
 } es_point_node_float;
 
 typedef struct es_point_tree {
