@@ -117,7 +117,7 @@ static void do_darker(player* p) { set_exposure(p, p->session.settings.exposure 
 static void do_method(player* p)
 {
     es_renderer_settings settings = p->session.settings;
-    settings.method = (settings.method + 1) % 3;
+    settings.method = settings.method < ES_GI_CLASSIC ? settings.method + 1 : settings.method == ES_GI_MICRO ? ES_GI_NONE : ES_GI_MICRO;
     player_configure(p, &settings);
 }
 
@@ -199,7 +199,7 @@ static const command commands[] = {
     {'L', PLAIN, false, do_light_part, "L", "light: all, direct, indirect"},
     {'I', PLAIN, false, do_image, "I 1 … 9", "next image, by number"},
     {'V', PLAIN, false, do_vpls, "V P", "virtual lights, shadow points"},
-    {'G', PLAIN, false, do_method, "G", "indirect: none, ism, classic"},
+    {'G', PLAIN, false, do_method, "G", "indirect: none, ism, classic, micro"},
     {'=', PLAIN, true, do_brighter, "+ -", "exposure"},
     {'R', CONTROL, false, do_coarser, "Ctrl R", "coarser pixels"},
     {0, PLAIN, false, NULL, NULL, "Compare"},

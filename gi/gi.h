@@ -19,7 +19,8 @@ typedef enum es_gi_method {
     ES_GI_ISM,      /* virtual point lights, imperfect shadow maps (Ritschel thesis §5.2) */
     ES_GI_CLASSIC,  /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
     ES_GI_VPL_TRACED, /* the same lights, visibility by rays, every light at every pixel unless traced_interleave: a judge; slower */
-    ES_GI_VPL_SAMPLED /* the same lights, interleaved; of its share of them each pixel chooses one by what it would send and tests it by a ray */
+    ES_GI_VPL_SAMPLED, /* the same lights, interleaved; of its share of them each pixel chooses one by what it would send and tests it by a ray */
+    ES_GI_MICRO     /* no such lights: at every pixel, or one of 4 or 16, light is gathered from a micro-buffer drawn of a hierarchy of points (Ritschel thesis §6) */
 } es_gi_method;
 
 /* What the methods with virtual point lights make of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
@@ -50,6 +51,17 @@ typedef enum es_bounce_method {
 } es_bounce_method;
 
 enum { ES_MAX_BOUNCES = 16 };
+
+/* With MICRO: nodes of the point hierarchy. */
+typedef enum es_micro_nodes { ES_MICRO_QUANTISED /* 128 bits each (§6.3.1) */, ES_MICRO_FLOAT } es_micro_nodes;
+
+/* With MICRO and several bounces: what lights the points besides the lights themselves. The last bounce is gathered. */
+typedef enum es_micro_light {
+    ES_MICRO_LIGHT_DIRECT,     /* nothing: one bounce, whatever es_renderer_settings.bounces says */
+    ES_MICRO_LIGHT_VPLS,       /* virtual point lights of all bounces but the last (§6.4.2) */
+    ES_MICRO_LIGHT_RADIOSITY,  /* gathering at an inner level of the hierarchy, several times (§6.4.3) */
+    ES_MICRO_LIGHT_PHOTONS     /* photons from the lights, their density at the points (§6.4.4) */
+} es_micro_light;
 
 typedef enum es_tone_map { ES_TONE_MAP_REINHARD, ES_TONE_MAP_PBR_NEUTRAL, ES_TONE_MAP_LINEAR } es_tone_map;
 
@@ -126,6 +138,22 @@ typedef struct es_renderer_settings {
     uint32_t bounce_vpls;            /* lights of each bounce after the first */
     uint32_t bounce_points;          /* ONE_PASS: points tried for each light that is reflected */
     uint32_t bounce_rays;            /* ONE_PASS with shadow maps: rays for each light, to some of those points; 0: the maps alone say what is seen */
+    /* micro-buffers: MICRO. What is above on virtual point lights, interleaving, filter, half_resolution and rays has no effect on it but through the lights
+     * of ES_MICRO_LIGHT_VPLS */
+    uint32_t micro_size;             /* pixels of a micro-buffer's side, 8 … 32, a multiple of 4 (thesis: 24) */
+    uint32_t micro_points;           /* of the whole scene, at most; each tree has a power of two */
+    uint32_t micro_spacing;          /* 1, 2, 4: light is gathered at every so manieth pixel of every so manieth row, and interpolated along surfaces, what
+                                      * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
+    float micro_cut;                 /* a node is drawn when its solid angle is at most this share of a pixel's */
+    bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
+    bool micro_warp;                 /* a pixel is a direction of the lobe's importance; off: of the cosine's, weighted by the lobe */
+    uint32_t micro_nodes;            /* es_micro_nodes */
+    uint32_t micro_light;            /* es_micro_light */
+    uint32_t micro_level;            /* RADIOSITY: level of the hierarchy that light is gathered at */
+    uint32_t micro_iterations;       /* RADIOSITY: times that it is gathered; 0: bounces - 1 */
+    uint32_t micro_photons;          /* PHOTONS: sent from all lights */
+    float micro_rebuild;             /* how much worse than new a deforming mesh's tree may be before it is built anew */
+    bool micro_emission;             /* glowing surfaces send light */
 } es_renderer_settings;
 
 ES_API es_renderer_settings es_default_renderer_settings(void);

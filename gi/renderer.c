@@ -55,6 +55,8 @@ static es_result check_settings(es_context* context, const es_renderer_settings*
     if (s->shadow_size % 8) return es_fail(context, ES_SETTING_VALUE, "shadow.size is %u; a multiple of 8 from 16 to 8192 is accepted", s->shadow_size);
     if (s->bounce_points % 64) return es_fail(context, ES_SETTING_VALUE, "bounce.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->bounce_points);
     if (s->ism_points % 64) return es_fail(context, ES_SETTING_VALUE, "ism.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->ism_points);
+    if (s->micro_size % 4) return es_fail(context, ES_SETTING_VALUE, "micro.size is %u; a multiple of 4 from 8 to 32 is accepted", s->micro_size);
+    if (!power_of_two(s->micro_spacing)) return es_fail(context, ES_SETTING_VALUE, "micro.spacing is %u; 1, 2 and 4 are accepted", s->micro_spacing);
     return ES_OK;
 }
 
@@ -486,7 +488,7 @@ static es_result render(es_renderer* r, es_world* world)
     in.has_geometry = es_world_bounds(world, &in.bounds_min, &in.bounds_max);
     in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-9f) : 1.0f;
     const es_renderer_settings* s = &r->settings;
-    in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
+    in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->method == ES_GI_MICRO ? "micro-buffers have no points yet" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
 
     r->frame = (es_frame_settings){*s, in.extent};
     result = es_history_begin(r, &in, world);
