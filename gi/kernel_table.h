@@ -10,6 +10,7 @@
 #include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/half_resolution.h"
+#include "gi/micro/light.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
 #include "gi/shade.h"
@@ -25,6 +26,7 @@
     /* rows [row_begin, row_end) */                                                                              \
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    X(light_points, (const es_point_light_job* job, const es_point_forest* forest, const es_leaf_range* range))  \
     /* a smaller image to the whole one's rows [row_begin, row_end) */                                         \
     X(upsample, (const es_upsample_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \

@@ -1,0 +1,37 @@
+/* Direct light of a forest's leaves, by the frame's shadow maps (Ritschel thesis §6.2.2, §6.4.1).
+ *
+ * A point sends the same radiance into all of its hemisphere. Of irradiance E from a direction whose cosine is c,
+ *     radiance = E / pi · (albedo · (1 - Fd(c)) · mean(1 - Fd) + lobe(c)) + emission,
+ * albedo, Fd as in gi/surface.h, the mean over directions by their cosine, lobe(c) the directional albedo of the lobe (gi/micro/lobe_albedo.h).
+ * So a point sends as much power as its surface would; what is approximated is where to: its lobe is spread over the hemisphere, and so is the
+ * interface's shadow at grazing directions. */
+#ifndef EARTHSHINE_GI_MICRO_LIGHT_H
+#define EARTHSHINE_GI_MICRO_LIGHT_H
+
+#include "gi/light_view.h"
+#include "gi/micro/forest.h"
+#include "gi/micro/lobe_albedo.h"
+
+typedef struct es_point_light_job {
+    const es_light_view* views;    /* with their shadow maps drawn */
+    uint32_t view_count;           /* 0: nothing is lit */
+    uint32_t shadow_filter;        /* as es_direct_job has them */
+    float shadow_bias, shadow_slope_bias;
+    bool emission;                 /* adds what the surfaces glow with */
+    const es_lobe_albedo* lobes;   /* filled */
+} es_point_light_job;
+
+/* Sets the radiance of all leaves, not of inner nodes: es_forest_pull does. Leaves are split among the context's threads; what one has does not
+ * depend on the others. Surfaces that are unlit only glow. */
+es_result es_points_light_direct(es_context* context, es_point_forest* forest, const es_point_light_job* job);
+
+/* ---- between light.c and its kernel ----------------------------------------------------------------------------------------------- */
+
+/* Leaves [leaf, leaf + count) of the forest's, which are the nodes from `node` on. */
+typedef struct es_leaf_range { size_t leaf, node; uint32_t count; } es_leaf_range;
+
+/* Calls body for all leaves, in parallel, in pieces that do not cross trees: of some hundred leaves, or of a small tree's. */
+typedef void (*es_leaf_body)(void* user, const es_leaf_range* range, uint32_t worker);
+void es_forest_each_leaf(es_context* context, const es_point_forest* forest, es_leaf_body body, void* user);
+
+#endif
