@@ -60,7 +60,7 @@ uint32_t es_shape_vertex(es_shape* shape, es_vec3 position, es_vec3 normal)
 static es_vec3 at(const float* values, uint32_t index) { return es_v3(values[3 * (size_t)index], values[3 * (size_t)index + 1], values[3 * (size_t)index + 2]); }
 static bool same(es_vec3 a, es_vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-void es_shape_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c)
+void es_shape_wound_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c)
 {
     size_t used = 3 * shape->triangle_count;
     if (stopped(shape)) return;
@@ -70,12 +70,19 @@ void es_shape_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c)
         fail(shape);
         return;
     }
+    shape->indices[used] = a;
+    shape->indices[used + 1] = b;
+    shape->indices[used + 2] = c;
+    shape->triangle_count++;
+}
+
+void es_shape_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c)
+{
+    if (stopped(shape)) return;
+    es_vec3 pa = at(shape->positions, a), pb = at(shape->positions, b), pc = at(shape->positions, c);
     es_vec3 n = es_v3_add(es_v3_add(at(shape->normals, a), at(shape->normals, b)), at(shape->normals, c));
     bool turn = es_v3_dot(es_v3_cross(es_v3_sub(pb, pa), es_v3_sub(pc, pa)), n) < 0;
-    shape->indices[used] = a;
-    shape->indices[used + 1] = turn ? c : b;
-    shape->indices[used + 2] = turn ? b : c;
-    shape->triangle_count++;
+    es_shape_wound_triangle(shape, a, turn ? c : b, turn ? b : c);
 }
 
 void es_shape_facet(es_shape* shape, es_vec3 a, es_vec3 b, es_vec3 c, es_vec3 normal)

@@ -26,6 +26,8 @@ es_result es_shape_add_mesh(es_shape* shape, es_world* world, const char* name, 
 uint32_t es_shape_vertex(es_shape* shape, es_vec3 position, es_vec3 normal);
 /* Turned round when needed so that its front agrees with the vertices' normals. */
 void es_shape_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c);
+/* As it is, for surfaces whose normals are smoothed over edges so sharp that these cannot say which side is the front. */
+void es_shape_wound_triangle(es_shape* shape, uint32_t a, uint32_t b, uint32_t c);
 /* A flat quadrilateral with its own four vertices. */
 void es_shape_quad(es_shape* shape, es_vec3 a, es_vec3 b, es_vec3 c, es_vec3 d, es_vec3 normal);
 /* A flat triangle with its own three vertices. */
