@@ -10,6 +10,7 @@
 #include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/half_resolution.h"
+#include "gi/micro/forest_parts.h"
 #include "gi/micro/light.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
@@ -45,7 +46,15 @@
     X(flip, (const es_flip_job* job, uint32_t x, uint32_t y, const es_flip_scratch* scratch))                    \
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
     X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))       \
-    X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))
+    X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))                   \
+    /* gi/micro/forest_parts.h: leaves, leaves, parents of one level, nodes, parents, nodes, parents */           \
+    X(forest_leaves, (const es_leaf_job* job, uint32_t begin, uint32_t end))                                     \
+    X(forest_pose, (const es_pose_job* job, uint32_t begin, uint32_t end))                                       \
+    X(forest_merge, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end, float* sum))                      \
+    X(forest_quantise, (const es_quantise_job* job, uint32_t begin, uint32_t end))                               \
+    X(forest_pull, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                   \
+    X(forest_pack, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                   \
+    X(forest_blend, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))
 
 struct es_gi_kernels {
 #define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;

@@ -43,11 +43,12 @@ static uint32_t normal_word(const es_raster_instance* instance, const float matr
     return es_pack_normal(normal);
 }
 
-static void read_surface(const es_raster_mesh* mesh, const es_material_desc* m, const corners* c, es_surfels* surfels, size_t at)
+es_surfel_words es_surfel_read(const es_raster_mesh* mesh, const es_material_desc* m, uint32_t triangle, uint32_t barycentric)
 {
+    const corners c = corners_of(mesh, triangle, barycentric);
     float color[4] = {1, 1, 1, 1}, uvs[4] = {0, 0, 0, 0}, texel[4];
-    if (mesh->colors) interpolate(mesh->colors, c, color);
-    if (mesh->uvs) interpolate(mesh->uvs, c, uvs);
+    if (mesh->colors) interpolate(mesh->colors, &c, color);
+    if (mesh->uvs) interpolate(mesh->uvs, &c, uvs);
     for (int k = 0; k < 4; k++) color[k] *= m->base_color[k];
     if (m->base_color_texture.image) {
         es_trace_sample_texture(&m->base_color_texture, uvs, texel);
@@ -63,11 +64,27 @@ static void read_surface(const es_raster_mesh* mesh, const es_material_desc* m, 
         es_trace_sample_texture(&m->specular_texture, uvs, texel);
         specular *= texel[3];
     }
-    uint32_t second = es_pack_unorm8(m->model == ES_SURFACE_PHONG ? m->exponent * (5.0f / 255.0f) : roughness), model = (uint32_t)m->model;
-    if (m->alpha_mask && color[3] < m->alpha_cutoff) model = ES_SURFACE_UNLIT; /* a hole: reflects nothing */
-    surfels->albedo_rg[at] = es_pack_unorm16(color[0]) | es_pack_unorm16(color[1]) << 16;
-    surfels->albedo_b[at] = es_pack_unorm16(color[2]) | (uint32_t)m->double_sided << 16;
-    surfels->surface[at] = es_pack_unorm8(metallic) | second << 8 | es_pack_unorm8(specular) << 16 | model << 24;
+    const bool hole = m->alpha_mask && color[3] < m->alpha_cutoff;
+    const uint32_t second = es_pack_unorm8(m->model == ES_SURFACE_PHONG ? m->exponent * (5.0f / 255.0f) : roughness), model = hole ? ES_SURFACE_UNLIT : (uint32_t)m->model;
+    return (es_surfel_words){
+        .albedo_rg = es_pack_unorm16(color[0]) | es_pack_unorm16(color[1]) << 16,
+        .albedo_b = es_pack_unorm16(color[2]) | (uint32_t)m->double_sided << 16,
+        .surface = es_pack_unorm8(metallic) | second << 8 | es_pack_unorm8(specular) << 16 | model << 24,
+        .hole = hole,
+    };
+}
+
+es_vec3 es_surfel_emission(const es_raster_mesh* mesh, const es_material_desc* m, uint32_t triangle, uint32_t barycentric)
+{
+    es_vec3 emission = es_v3(m->emission[0], m->emission[1], m->emission[2]);
+    if (m->emission_texture.image) {
+        const corners c = corners_of(mesh, triangle, barycentric);
+        float uvs[4] = {0, 0, 0, 0}, texel[4];
+        if (mesh->uvs) interpolate(mesh->uvs, &c, uvs);
+        es_trace_sample_texture(&m->emission_texture, uvs, texel);
+        emission = es_v3_mul(emission, es_v3(texel[0], texel[1], texel[2]));
+    }
+    return emission;
 }
 
 typedef struct reading {
@@ -99,7 +116,10 @@ static void read_instance(const reading* r, uint32_t index)
             corners c = corners_of(instance->mesh, points->triangle[i], points->barycentric[i]);
             r->surfels->normal[i] = normal_word(instance, matrix, mirrored, &c);
             r->surfels->area[i] = area;
-            read_surface(instance->mesh, material, &c, r->surfels, i);
+            const es_surfel_words words = es_surfel_read(instance->mesh, material, points->triangle[i], points->barycentric[i]);
+            r->surfels->albedo_rg[i] = words.albedo_rg;
+            r->surfels->albedo_b[i] = words.albedo_b;
+            r->surfels->surface[i] = words.surface;
         }
     }
 }

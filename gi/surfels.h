@@ -5,6 +5,16 @@
 
 #include "gi/scene_points.h"
 
+/* What is at a place on a mesh (triangle and barycentric as es_scene_points has them): words as a G-buffer has them, normal maps left out. Of a
+ * hole that a mask cuts the model is UNLIT, which reflects nothing. */
+typedef struct es_surfel_words {
+    uint32_t albedo_rg, albedo_b, surface;
+    bool hole;
+} es_surfel_words;
+es_surfel_words es_surfel_read(const es_raster_mesh* mesh, const es_material_desc* material, uint32_t triangle, uint32_t barycentric);
+/* W/(m² sr), of the front */
+es_vec3 es_surfel_emission(const es_raster_mesh* mesh, const es_material_desc* material, uint32_t triangle, uint32_t barycentric);
+
 /* Words as a G-buffer has them (raster/raster.h), one for each point and up to the next multiple of eight; normal maps are left out. The
  * normal is the front's. The upper half of albedo_b says whether the material is double-sided. */
 typedef struct es_surfels {

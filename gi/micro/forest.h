@@ -16,7 +16,7 @@
 #include "gi/gi.h"
 
 /* 128 bits (§6.3.1). Decoded: centre = low + step · position, radius = radius_step · radius, never less than what it was made from together with
- * the centre's rounding. */
+ * the centre's rounding; 0: nothing is there (float_nodes: below 0), which is so of padding and of what a mask cuts out. */
 typedef struct es_point_node {
     uint16_t position[3], radius;
     uint32_t cone;             /* bits 0 … 9 and 10 … 19: axis of the cone of normals, octahedral, each n as 2 n / 1023 - 1; bits 20 … 25: s, the sine of its half

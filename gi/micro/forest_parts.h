@@ -1,0 +1,141 @@
+/* Between the files of the hierarchy of points: forest.c brings it up to the scene, points.c places, tree_build.c splits, tree_refit.c computes nodes,
+ * gi/kernels/forest.c does so eight at a time. */
+#ifndef EARTHSHINE_GI_MICRO_FOREST_PARTS_H
+#define EARTHSHINE_GI_MICRO_FOREST_PARTS_H
+
+#include "gi/micro/forest.h"
+
+/* ---- one tree's nodes, for the kernels ----------------------------------------------------------------------------------------------- */
+
+/* Arrays begin at the tree's own nodes and leaves; leaf k is node leaf_count + k. */
+typedef struct es_tree_nodes {
+    es_point_node_float* floats;
+    es_point_node* packed;
+    float* radiance[3];
+    float* area;
+    uint32_t *albedo, *emission;
+    uint32_t leaf_count;
+} es_tree_nodes;
+
+/* A disc's shape follows its triangle. With u = b - a, v = c - a of the triangle as it is now, its axes are
+ *     t1 = along · u,   t2 = across · (v - shear · u),
+ * chosen so that in the pose in which points were placed they are orthogonal and as long as the disc's radius. Now |t1 × t2| is the square of the radius of the
+ * circle of the same area, and the square root of the larger eigenvalue of the gram of t1, t2 is the radius of the disc that covers the stretched one. */
+typedef struct es_leaf_shapes { float *along, *across, *shear; } es_leaf_shapes; /* along < 0: a hole in the surface, which has no disc */
+
+typedef struct es_leaf_job {
+    const es_raster_mesh* mesh;
+    const float* positions;            /* the mesh's, or those at rest */
+    float u[9];                        /* columns; upper triangular */
+    float cofactors[9];                /* of u over its largest element, for normals */
+    float side;                        /* 1: front, -1: back */
+    const uint32_t *triangle, *barycentric;
+    es_leaf_shapes shapes;
+    es_tree_nodes nodes;
+} es_leaf_job;
+
+typedef struct es_pose_job {
+    float rotation[9], translation[3];
+    es_tree_nodes nodes;
+    float *x, *y, *z;
+    uint32_t* normal;
+} es_pose_job;
+
+typedef struct es_quantise_job {
+    float low[3], step[3], radius_step;
+    es_tree_nodes nodes;
+} es_quantise_job;
+
+/* A disc's radius over that of the circle of the area it stands for, so that discs leave no holes between them. */
+#define ES_POINT_OVERLAP 1.5f
+/* How much longer than wide a stretched disc may count: beyond, what is stretched leaves holes instead of growing out of its surface. */
+#define ES_POINT_STRETCH 4.0f
+/* Coordinates beyond are taken to it: squares of areas stay finite. */
+#define ES_POINT_FARTHEST 1e9f
+
+/* ---- where an instance is -------------------------------------------------------------------------------------------------------------- */
+
+/* transform = Q U. U is rounded to 16 bits, so that turning a thing leaves it as it is. */
+typedef struct es_point_pose {
+    float u[9], rotation[9], translation[3];
+    float shape[9];                    /* U over `scale`, coarsely rounded: points are placed in this space, and again when it changes */
+    float scale;                       /* 0: the transform leaves no area */
+} es_point_pose;
+
+es_point_pose es_point_pose_of(const es_mat4* transform);
+
+/* ---- places ---------------------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct es_placing {
+    const es_raster_mesh* mesh;
+    const float* shape;
+    const double* before;              /* area before each triangle, at rest, in the space of shape; one more entry: all */
+    uint32_t count;
+    uint32_t *triangle, *barycentric;
+    es_leaf_shapes shapes;
+} es_placing;
+
+/* before[triangle_count + 1]; returns the whole */
+double es_point_areas(es_context* context, const es_raster_mesh* mesh, const float shape[9], double* before);
+/* context NULL: on this thread */
+void es_point_place(es_context* context, const es_placing* placing);
+/* in the space of `shape` */
+void es_point_rest_position(const es_raster_mesh* mesh, const float shape[9], uint32_t triangle, uint32_t barycentric, float position[3]);
+
+/* ---- splitting ------------------------------------------------------------------------------------------------------------------------------- */
+
+typedef struct es_split_point { float position[3]; uint32_t index; } es_split_point;
+
+/* Orders `count` (a power of two) points so that halves, quarters … of the array are the tree's subtrees: each is split at the median of its longest axis, equal
+ * coordinates by their index. context NULL: on this thread. */
+void es_tree_split(es_context* context, es_split_point* points, uint32_t count);
+/* The same for any number; the first half has one more when it is odd. */
+void es_tree_split_any(es_split_point* points, uint32_t count);
+
+/* ---- nodes ------------------------------------------------------------------------------------------------------------------------------------- */
+
+enum { ES_TREE_BLOCK = 4096 };  /* leaves that one task takes with all nodes above them; a power of two */
+
+/* The block-th ES_TREE_BLOCK leaves of a tree, or all, if it has fewer. */
+typedef struct es_tree_task {
+    uint32_t tree, block;
+    float sum;                  /* of the squared radii of its inner nodes */
+} es_tree_task;
+
+/* What of a tree is to be computed. */
+typedef enum es_tree_work {
+    ES_TREE_NODES = 1,          /* leaves from their triangles, and all above */
+    ES_TREE_POSE = 2,           /* leaves' places and normals in the world */
+    ES_TREE_LOOKS = 4           /* what inner nodes reflect and emit */
+} es_tree_work;
+
+/* What the forest knows of a tree besides what it shows. */
+typedef struct es_tree_state {
+    const es_raster_mesh* mesh;
+    uint32_t id, source;        /* es_raster_instance.id; index of the instance */
+    float u[9];
+    uint32_t material;
+    uint64_t rest;              /* hash of the pose at rest and of `shape`: where the points are */
+    uint64_t revision;
+    double measure, base;       /* of the tree as it is, and after it was split: squared radii of all inner nodes over the leaves' area */
+    uint32_t work;              /* es_tree_work */
+    uint32_t holes;             /* leaves that have no disc */
+} es_tree_state;
+
+struct es_forest_private {
+    struct es_forest_source* sources; /* of the list's instances (forest.c) */
+    uint32_t source_count;
+    es_tree_state* states;      /* of the trees */
+    es_leaf_shapes shapes;      /* of the leaves */
+    es_tree_task* tasks;
+    size_t task_count;
+    uint64_t materials;
+};
+
+es_tree_nodes es_forest_nodes(const es_point_forest* forest, const es_point_tree* tree);
+/* Does the states' work; with `rest`, nodes of the pose at rest and nothing else. */
+void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw_list* list, bool rest);
+/* The tree of trees; `order` holds two es_split_point for each of its leaves. */
+void es_forest_refit_top(es_context* context, es_point_forest* forest, es_split_point* order);
+
+#endif
