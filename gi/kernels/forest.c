@@ -19,6 +19,18 @@ VINL void store_nodes(es_point_node_float* nodes, uint32_t n, vf v[8])
     vf_transpose8(v);
     for (uint32_t k = 0; k < n; k++) vf_store(nodes[k].position, v[k]);
 }
+VINL vf load_slabs(const es_point_node_float* nodes, uint32_t stride, uint32_t n)
+{
+    float w[VW];
+    for (uint32_t k = 0; k < VW; k++) w[k] = nodes[stride * (k < n ? k : 0)].slab;
+    return vf_load(w);
+}
+VINL void store_slabs(es_point_node_float* nodes, uint32_t n, vf v)
+{
+    float w[VW];
+    vf_store(w, v);
+    for (uint32_t k = 0; k < n; k++) nodes[k].slab = w[k];
+}
 VINL vi load_words(const uint32_t* words, uint32_t stride, uint32_t n)
 {
     uint32_t w[VW];
@@ -138,6 +150,7 @@ void ES_KERNEL(es_gi_forest_leaves)(const es_leaf_job* job, uint32_t begin, uint
         node[6] = normal.z;
         node[7] = vf_zero();
         store_nodes(job->nodes.floats + leaves + i, n, node);
+        store_slabs(job->nodes.floats + leaves + i, n, vf_zero());
     }
 }
 
@@ -193,6 +206,14 @@ VINL void merge_cones(const v3 axis1, vf s1, const v3 axis2, vf s2, v3* axis, vf
     *sine = vf_select(wide | lost | vm_gt(*sine, one), two, *sine);
 }
 
+/* How far from the plane through `centre` across `axis` leaves' centres of a child may be, its own being within its slab and its sphere. */
+VINL vf reach_across(const vf centre[3], v3 axis, const vf child[8], vf slab)
+{
+    const v3 own = {child[4], child[5], child[6]}, way = {child[0] - centre[0], child[1] - centre[1], child[2] - centre[2]}, across = v3_cross(axis, own);
+    const vf turned = vf_sqrt(v3_dot(across, across));
+    return vf_abs(v3_dot(way, axis)) + vf_min(slab + child[3] * turned, child[3]);
+}
+
 /* Parents [begin, end) of one level: sphere, cone and area; *sum is the sum of their squared radii. */
 void ES_KERNEL(es_gi_forest_merge)(const es_tree_nodes* nodes, uint32_t begin, uint32_t end, float* sum)
 {
@@ -220,9 +241,14 @@ void ES_KERNEL(es_gi_forest_merge)(const es_tree_nodes* nodes, uint32_t begin, u
         node[5] = vf_select(no_right, axis1.y, vf_select(no_left, axis2.y, axis.y));
         node[6] = vf_select(no_right, axis1.z, vf_select(no_left, axis2.z, axis.z));
         node[7] = vf_select(no_right, l[7], vf_select(no_left, r[7], sine));
+        const vf slab1 = load_slabs(nodes->floats + 2 * (size_t)i, 2, n), slab2 = load_slabs(nodes->floats + 2 * (size_t)i + 1, 2, n);
+        vf slab = vf_max(reach_across(node, axis, l, slab1), reach_across(node, axis, r, slab2)) * vf_set1(1.0f + 1e-6f);
+        slab = vf_min(vf_select(vm_gt(sine, vf_set1(1.0f)), node[3], slab), node[3]);
+        slab = vf_select(no_right, slab1, vf_select(no_left, slab2, slab));
         total = total + vf_and(vm_first((int32_t)n) & vm_gt(node[3], vf_zero()), node[3] * node[3]);
         store_floats(nodes->area + i, n, load_floats(nodes->area + 2 * (size_t)i, 2, n) + load_floats(nodes->area + 2 * (size_t)i + 1, 2, n));
         store_nodes(nodes->floats + i, n, node);
+        store_slabs(nodes->floats + i, n, slab);
     }
     *sum = vf_sum(total);
 }
@@ -253,9 +279,9 @@ void ES_KERNEL(es_gi_forest_quantise)(const es_quantise_job* job, uint32_t begin
         const vf px = node[4] * norm, py = node[5] * norm;
         const vm below = vm_lt(node[6], vf_zero());
         const vf ox = vf_select(below, vf_copysign(one - vf_abs(py), px), px), oy = vf_select(below, vf_copysign(one - vf_abs(px), py), py);
-        const vi qx = vi_round(vf_min(vf_max((ox + one) * vf_set1(2047.5f), vf_zero()), vf_set1(4095.0f)));
-        const vi qy = vi_round(vf_min(vf_max((oy + one) * vf_set1(2047.5f), vf_zero()), vf_set1(4095.0f)));
-        v3 axis = {vf_from_int(qx) * vf_set1(2.0f / 4095.0f) - one, vf_from_int(qy) * vf_set1(2.0f / 4095.0f) - one, vf_zero()};
+        const vi qx = vi_round(vf_min(vf_max((ox + one) * vf_set1(511.5f), vf_zero()), vf_set1(1023.0f)));
+        const vi qy = vi_round(vf_min(vf_max((oy + one) * vf_set1(511.5f), vf_zero()), vf_set1(1023.0f)));
+        v3 axis = {vf_from_int(qx) * vf_set1(2.0f / 1023.0f) - one, vf_from_int(qy) * vf_set1(2.0f / 1023.0f) - one, vf_zero()};
         axis.z = one - vf_abs(axis.x) - vf_abs(axis.y);
         const vf fold = vf_max(vf_neg(axis.z), vf_zero());
         axis.x = axis.x - vf_copysign(fold, axis.x);
@@ -266,13 +292,18 @@ void ES_KERNEL(es_gi_forest_quantise)(const es_quantise_job* job, uint32_t begin
         const vf whole = sine * vf_sqrt(vf_max(one - error * error, vf_zero())) + vf_sqrt(vf_max(one - sine * sine, vf_zero())) * error;
         /* beyond 90° the sine falls again: α + ε passes it when the cosine of the sum is negative */
         const vf cosine = vf_sqrt(vf_max(one - sine * sine, vf_zero())) * vf_sqrt(vf_max(one - error * error, vf_zero())) - sine * error;
-        vi cone = vi_truncate(whole * vf_set1(254.0f * (1.0f + 1e-6f))) + vi_set1(1);
-        cone = vi_select(vm_gt(node[7], one) | vm_le(cosine, vf_zero()) | vi_gt(cone, vi_set1(254)), vi_set1(255), cone);
+        vi cone = vi_truncate(whole * vf_set1(62.0f * (1.0f + 1e-6f))) + vi_set1(1);
+        cone = vi_select(vm_gt(node[7], one) | vm_le(cosine, vf_zero()) | vi_gt(cone, vi_set1(62)), vi_set1(63), cone);
+
+        /* rounding of what is flat is none */
+        const vf slab = load_slabs(job->nodes.floats + i, 1, n);
+        vi thickness = vi_truncate(vf_min(slab / vf_max(node[3], vf_set1(1e-30f)), one) * vf_set1(63.0f * (1.0f - 1e-6f))) + vi_set1(1);
+        thickness = vi_select(vm_le(slab, node[3] * vf_set1(ES_POINT_FLAT)), vi_zero(), thickness);
 
         uint32_t words[3][VW];
         vi_store(words[0], q[0] | q[1] << 16);
         vi_store(words[1], q[2] | radius << 16);
-        vi_store(words[2], qx | qy << 12 | cone << 24);
+        vi_store(words[2], qx | qy << 10 | cone << 20 | thickness << 26);
         for (uint32_t k = 0; k < n; k++)
             for (int w = 0; w < 3; w++) memcpy((char*)(job->nodes.packed + i + k) + 4 * w, &words[w][k], 4);
     }

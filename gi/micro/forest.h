@@ -21,7 +21,8 @@ typedef struct es_point_node {
     uint16_t position[3], radius;
     uint32_t cone;             /* bits 0 … 9 and 10 … 19: axis of the cone of normals, octahedral, each n as 2 n / 1023 - 1; bits 20 … 25: s, the sine of its half
                                 * angle is at most s / 62, the axis' own error included, 63: wider than 90°, may face any way; bits 26 … 31: f, the slab's
-                                * half thickness is at most f / 63 of the radius: 0 is exactly flat, as the parts of a wall are */
+                                * half thickness is at most f / 63 of the float node's radius: 0 is flat, to 1 / 4096 of it, as the
+                                * parts of a wall are; the slab is that of the float node's axis and position */
     uint32_t radiance;         /* W/(m² sr) sent by its front, RGB9E5 (raster/pack.h) */
 } es_point_node;
 

@@ -50,6 +50,8 @@ typedef struct es_quantise_job {
 #define ES_POINT_OVERLAP 1.5f
 /* How much longer than wide a stretched disc may count: beyond, what is stretched leaves holes instead of growing out of its surface. */
 #define ES_POINT_STRETCH 4.0f
+/* Share of a node's radius that is no thickness. */
+#define ES_POINT_FLAT (1.0f / 4096.0f)
 /* Coordinates beyond are taken to it: squares of areas stay finite. */
 #define ES_POINT_FARTHEST 1e9f
 

@@ -190,6 +190,7 @@ static void top_leaf(const es_point_forest* forest, uint32_t slot)
     /* what the rounding of the pose may have moved it */
     out->radius = root->radius < 0.0f ? root->radius : root->radius * (1.0f + 1e-6f) + reach * 5e-7f;
     out->sine = root->sine > 1.0f ? 2.0f : es_minf(root->sine + 2e-6f, 1.0f);
+    out->slab = es_minf(root->slab + reach * 5e-7f, es_maxf(out->radius, 0.0f));
     top.area[node] = nodes.area[1];
     top.albedo[node] = nodes.albedo[1];
     top.emission[node] = nodes.emission[1];
