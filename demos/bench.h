@@ -153,6 +153,9 @@ bool bench_cloth(uint32_t n, uint32_t threads, uint32_t steps, double* milliseco
 /* bench_bounces.c */
 int bench_bounces(const bench_options* options);
 size_t bench_bounces_rows(bench_row* rows, size_t capacity);
+/* bench_micro.c */
+int bench_micro(const bench_options* options);
+size_t bench_micro_rows(bench_row* rows, size_t capacity);
 /* bench_ledger.c */
 int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */

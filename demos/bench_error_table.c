@@ -11,6 +11,10 @@
 #define HALF "imperfect maps, half resolution", 2, true
 #define HALF_6 "half resolution, 6×6 interleaved, less bounded", 3, true
 #define SAMPLED "one light a pixel, tested by a ray, half resolution", 4, true
+#define MICRO "micro-buffers at every pixel", 7, true
+#define MICRO_4 "micro-buffers at one pixel of 4", 0, true
+#define MICRO_16 "micro-buffers at one pixel of 16", 1, true
+#define MICRO_OTHER "micro-buffers at every pixel, one thing changed", 7, false
 #define RAYS "rays to the lights, 8×8 interleaved", 6, false
 
 static const error_setting table[] = {
@@ -57,6 +61,23 @@ static const error_setting table[] = {
 
     {SAMPLED, "1024 lights", "gi=vpl-sampled half-resolution=true vpl.near=0.08", true},
     {SAMPLED, "4096 lights", "gi=vpl-sampled half-resolution=true vpl.near=0.04 vpl.count=4096", false},
+
+    {MICRO, "every pixel, 24²", "gi=micro micro.emission=false", true},
+    {MICRO, "every pixel, 8²", "gi=micro micro.emission=false micro.size=8", false},
+    {MICRO, "every pixel, 16²", "gi=micro micro.emission=false micro.size=16", false},
+    {MICRO, "every pixel, 32²", "gi=micro micro.emission=false micro.size=32", false},
+    {MICRO, "every pixel, 24², 1M points", "gi=micro micro.emission=false micro.points=1048576", false},
+    {MICRO_4, "8²", "gi=micro micro.emission=false micro.spacing=2 micro.size=8", false},
+    {MICRO_4, "16²", "gi=micro micro.emission=false micro.spacing=2 micro.size=16", false},
+    {MICRO_4, "24²", "gi=micro micro.emission=false micro.spacing=2", true},
+    {MICRO_16, "8², 64k points", "gi=micro micro.emission=false micro.spacing=4 micro.size=8 micro.points=65536", false},
+    {MICRO_16, "8²", "gi=micro micro.emission=false micro.spacing=4 micro.size=8", true},
+    {MICRO_16, "12²", "gi=micro micro.emission=false micro.spacing=4 micro.size=12", false},
+    {MICRO_16, "16²", "gi=micro micro.emission=false micro.spacing=4 micro.size=16", false},
+    {MICRO_16, "24²", "gi=micro micro.emission=false micro.spacing=4", true},
+    {MICRO_OTHER, "no rays to large points", "gi=micro micro.emission=false micro.ray-cast=false", false},
+    {MICRO_OTHER, "not warped", "gi=micro micro.emission=false micro.warp=false", false},
+    {MICRO_OTHER, "nodes of floats", "gi=micro micro.emission=false micro.nodes=float", false},
 
     {CLASSIC, "256 lights", "gi=classic vpl.count=256", false},
     {CLASSIC, "1024 lights", "gi=classic vpl.count=1024", false},

@@ -384,6 +384,9 @@ says '^gbuffer-70k +[0-9.]+ ms '
 for file in speed.json speed.csv speed-targets.svg index.html; do [ -s figures/$file ] || fail "no $file"; done
 expect 0 bench frame --runs 1 --no-peer --out figures
 expect 0 bench bounces --quick --only bounce-2-cornell --size 48x32 --spp 2 --threads 2 --out figures
+refused 'did you mean micro-refit' bench micro --only micro-refi
+expect 0 bench micro --quick --no-peer --size 48x32 --spp 2 --threads 2 --out figures --only micro-sixteenth --only micro-refit --only micro-error-cornell --only micro-equal-time-contact-cornell --only micro-ring-ggx-0.2
+says '^micro-error-cornell +[0-9.]+ relRMSE'
 expect 0 bench scale --quick --only scale-threads --size 64x48 --threads 2 --out figures
 says '^scale-threads +[0-9.]+ x '
 refused '--spp 1' bench error --spp 1
@@ -400,7 +403,7 @@ if command -v python3 >/dev/null; then
     checks=$((checks + 1))
     python3 - <<'PYTHON' >out 2>err || fail 'the files of bench are not as described'
 import glob, json, re, xml.etree.ElementTree as tree
-for name in ('speed', 'frame', 'error', 'scale', 'ledger'):
+for name in ('speed', 'frame', 'error', 'micro', 'scale', 'ledger'):
     report = json.load(open(f'figures/{name}.json'))
     assert set(report['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit'}, report['machine']
     assert report['date'].startswith('20') and report['rows'], report
@@ -416,6 +419,10 @@ for point in error['points']:
     assert point['scene'] == 'cornell' and point['ms'] > 0 and point['flip'] >= 0, point
 assert [plot['id'] for plot in error['plots']][:3] == ['cornell-error', 'cornell-flip', 'cornell-flicker']
 assert all(plot['headline'] for report in (error,) for plot in report['plots'])
+micro = {row['id']: row for row in json.load(open('figures/micro.json'))['rows']}
+assert set(micro) == {'micro-sixteenth', 'micro-refit', 'micro-error-cornell', 'micro-equal-time-contact-cornell', 'micro-ring-ggx-0.2'}, set(micro)
+assert micro['micro-sixteenth']['value'] > 0 and micro['micro-sixteenth']['must'] == 6 and micro['micro-refit']['aim'] == 8
+assert micro['micro-ring-ggx-0.2']['peer_value'] > 0, micro
 scale = json.load(open('figures/scale.json'))
 assert all(point['axis'] == 'threads' and point['ms'] >= max(point['passes'].values()) for point in scale['points']) and scale['points']
 rows = {row['id']: row['value'] for row in json.load(open('figures/ledger.json'))['rows']}
@@ -428,7 +435,7 @@ for drawing in glob.glob('figures/*.svg'):
     tree.parse(drawing)
 text = open('figures/index.html').read()
 page = tree.fromstring(text)  # well-formed as XML too
-assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'bounces', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
+assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'bounces', 'micro', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
 names = {element.tag for element in page.iter()}
 assert not names & {'script', 'link', 'iframe', 'object', 'image', 'use'}, names
 assert not re.search(r'https?:|url\(|@import|src="(?!data:image/png;base64,)', text), 'the page loads something'
