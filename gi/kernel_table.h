@@ -11,6 +11,7 @@
 #include "gi/gi.h"
 #include "gi/half_resolution.h"
 #include "gi/micro/forest_parts.h"
+#include "gi/micro/gather.h"
 #include "gi/micro/light.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
@@ -54,7 +55,9 @@
     X(forest_quantise, (const es_quantise_job* job, uint32_t begin, uint32_t end))                               \
     X(forest_pull, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                   \
     X(forest_pack, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                   \
-    X(forest_blend, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))
+    X(forest_blend, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                  \
+    /* points order[first … first + count), 1 … ES_MICRO_CELL of them */                                         \
+    X(micro_gather, (const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* scratch))
 
 struct es_gi_kernels {
 #define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;

@@ -19,10 +19,10 @@
  * the centre's rounding; 0: nothing is there (float_nodes: below 0), which is so of padding and of what a mask cuts out. */
 typedef struct es_point_node {
     uint16_t position[3], radius;
-    uint32_t cone;             /* bits 0 … 9 and 10 … 19: axis of the cone of normals, octahedral, each n as 2 n / 1023 - 1; bits 20 … 25: s, the sine of its half
-                                * angle is at most s / 62, the axis' own error included, 63: wider than 90°, may face any way; bits 26 … 31: f, the slab's
-                                * half thickness is at most f / 63 of the float node's radius: 0 is flat, to 1 / 4096 of it, as the
-                                * parts of a wall are; the slab is that of the float node's axis and position */
+    uint32_t cone;             /* bits 0 … 9 and 10 … 19: axis of the cone of normals, octahedral, each n as (n - 512) / 511, so that what is along an axis is
+                                * exactly so; bits 20 … 25: s, the sine of its half angle is at most (s / 62)², the axis' own error included, 63: wider than 90°,
+                                * may face any way; bits 26 … 31: f, the slab's half thickness is at most f / 63 of the float node's radius: 0 is flat, to 1 / 4096
+                                * of it, as the parts of a wall are; the slab is that of the float node's axis and position */
     uint32_t radiance;         /* W/(m² sr) sent by its front, RGB9E5 (raster/pack.h) */
 } es_point_node;
 

@@ -32,10 +32,10 @@ typedef struct es_micro_settings {
     bool quantised;        /* nodes of 128 bits; off: floats */
 } es_micro_settings;
 
-typedef struct es_micro_stats { uint64_t samples, visited, drawn, cast; } es_micro_stats; /* pixels of micro-buffers; node visits times points; nodes drawn; leaves met by rays */
+typedef struct es_micro_stats { uint64_t samples, drawn, cast; } es_micro_stats; /* pixels of micro-buffers; nodes of the cuts times points; leaves met by rays times points */
 
-/* result[k][i] of point i. Points are gathered in groups along a space-filling curve, in parallel; what one gets does not depend on the others.
- * stats may be NULL. */
+/* result[k][i] of point i. Points are gathered in cells along a space-filling curve, in parallel. Those of a cell share a cut, which is as fine as any of them
+ * wants: what a point gets depends a little on its neighbours, but not on threads or instruction sets. stats may be NULL. */
 es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats);
 
 #endif
