@@ -116,9 +116,9 @@ static ball float_ball(const es_point_node_float* n)
 
 static ball packed_ball(const es_point_tree* tree, const es_point_node* n)
 {
-    ball b = {.radius = (double)tree->radius_step * n->radius, .sine = (n->cone >> 20 & 63) == 63 ? 2.0 : (n->cone >> 20 & 63) / 62.0};
+    ball b = {.radius = (double)tree->radius_step * n->radius, .sine = (n->cone >> 20 & 63) == 63 ? 2.0 : pow((n->cone >> 20 & 63) / 62.0, 2)};
     for (int k = 0; k < 3; k++) b.centre[k] = (double)tree->low[k] + (double)tree->step[k] * n->position[k];
-    double x = 2.0 * (n->cone & 1023) / 1023.0 - 1.0, y = 2.0 * (n->cone >> 10 & 1023) / 1023.0 - 1.0, z = 1.0 - fabs(x) - fabs(y);
+    double x = ((int)(n->cone & 1023) - 512) / 511.0, y = ((int)(n->cone >> 10 & 1023) - 512) / 511.0, z = 1.0 - fabs(x) - fabs(y);
     if (z < 0) {
         const double fold = -z;
         x -= copysign(fold, x);
@@ -169,7 +169,7 @@ static void check_tree(const es_point_forest* forest, const es_point_tree* tree)
             assert_true(p.radius <= b.radius + 2.1 * (double)tree->radius_step + 1.8 * (double)fmaxf(tree->step[0], fmaxf(tree->step[1], tree->step[2])));
             const double slab = (double)nodes[i].slab / fmax((double)nodes[i].radius, 1e-30), thickness = (packed[i].cone >> 26) / 63.0;
             assert_true(slab <= 1.0 && (slab <= thickness + 1e-6 || (slab <= 1.0 / 4096 && thickness == 0)) && thickness <= slab + 1.0 / 63 + 1e-6);
-            assert_true(p.sine > 1 || p.sine <= b.sine + 1.0 / 62 + 5e-3);
+            assert_true(p.sine > 1 || sqrt(p.sine) <= sqrt(b.sine + 5e-3) + 1.0 / 62 + 1e-6);
         }
         if (i < tree->leaf_count) assert_true(fabsf(area[2 * i] + area[2 * i + 1] - area[i]) <= 1e-6f * area[i]);
         /* of a leaf, all above it; of others, their parents, from which that follows but for rounding */

@@ -279,9 +279,9 @@ void ES_KERNEL(es_gi_forest_quantise)(const es_quantise_job* job, uint32_t begin
         const vf px = node[4] * norm, py = node[5] * norm;
         const vm below = vm_lt(node[6], vf_zero());
         const vf ox = vf_select(below, vf_copysign(one - vf_abs(py), px), px), oy = vf_select(below, vf_copysign(one - vf_abs(px), py), py);
-        const vi qx = vi_round(vf_min(vf_max((ox + one) * vf_set1(511.5f), vf_zero()), vf_set1(1023.0f)));
-        const vi qy = vi_round(vf_min(vf_max((oy + one) * vf_set1(511.5f), vf_zero()), vf_set1(1023.0f)));
-        v3 axis = {vf_from_int(qx) * vf_set1(2.0f / 1023.0f) - one, vf_from_int(qy) * vf_set1(2.0f / 1023.0f) - one, vf_zero()};
+        const vi qx = vi_round(ox * vf_set1(511.0f)) + vi_set1(512);
+        const vi qy = vi_round(oy * vf_set1(511.0f)) + vi_set1(512);
+        v3 axis = {vf_from_int(qx - vi_set1(512)) * vf_set1(1.0f / 511.0f), vf_from_int(qy - vi_set1(512)) * vf_set1(1.0f / 511.0f), vf_zero()};
         axis.z = one - vf_abs(axis.x) - vf_abs(axis.y);
         const vf fold = vf_max(vf_neg(axis.z), vf_zero());
         axis.x = axis.x - vf_copysign(fold, axis.x);
@@ -292,7 +292,7 @@ void ES_KERNEL(es_gi_forest_quantise)(const es_quantise_job* job, uint32_t begin
         const vf whole = sine * vf_sqrt(vf_max(one - error * error, vf_zero())) + vf_sqrt(vf_max(one - sine * sine, vf_zero())) * error;
         /* beyond 90° the sine falls again: α + ε passes it when the cosine of the sum is negative */
         const vf cosine = vf_sqrt(vf_max(one - sine * sine, vf_zero())) * vf_sqrt(vf_max(one - error * error, vf_zero())) - sine * error;
-        vi cone = vi_truncate(whole * vf_set1(62.0f * (1.0f + 1e-6f))) + vi_set1(1);
+        vi cone = vi_truncate(vf_sqrt(vf_max(whole, vf_zero())) * vf_set1(62.0f * (1.0f + 1e-6f))) + vi_set1(1);
         cone = vi_select(vm_gt(node[7], one) | vm_le(cosine, vf_zero()) | vi_gt(cone, vi_set1(62)), vi_set1(63), cone);
 
         /* rounding of what is flat is none */

@@ -26,8 +26,8 @@
 #define EMPTY INT32_MAX
 /* Points whose common cut has more nodes are too far from each other to share it. */
 enum { LARGE_CUT = 12000 };
-/* What is seen at less than this sine sends nothing worth having, and by it a wall does not see itself. */
-#define GRAZING 1e-3f
+/* What is seen at less than this sine sends nothing worth having; and by it a wall does not see itself, whose nodes' axes are off by up to (3 / 62)². */
+#define GRAZING 4e-3f
 
 /* ---- the cut ------------------------------------------------------------------------------------------------------------------- */
 
