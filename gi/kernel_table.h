@@ -13,6 +13,7 @@
 #include "gi/micro/forest_parts.h"
 #include "gi/micro/gather.h"
 #include "gi/micro/light.h"
+#include "gi/micro/point_level.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
 #include "gi/shade.h"
@@ -29,6 +30,9 @@
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(light_points, (const es_point_light_job* job, const es_point_forest* forest, const es_leaf_range* range))  \
+    X(push_points, (const es_point_push* push, const es_point_forest* forest, const es_push_range* range)) \
+    /* all lights [begin, end) at the points of a batch, whose lanes without a normal get nothing */                \
+    X(shade_points, (const es_shade_job* job, const es_shade_light* lights, uint32_t begin, uint32_t end, es_shade_batch* batch, uint32_t lanes)) \
     /* a smaller image to the whole one's rows [row_begin, row_end) */                                         \
     X(upsample, (const es_upsample_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \

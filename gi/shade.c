@@ -172,3 +172,48 @@ es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job
     es_parallel_for(context, rectangles * n, 1, shade_blocks, &loop);
     return ES_OK;
 }
+
+/* ---- points ------------------------------------------------------------------------------------------------------------------ */
+
+typedef struct points_loop {
+    const es_shade_job* job;
+    const es_shade_light* lights;
+    const es_shade_points* points;
+    es_shade_batch* batches;   /* one a worker */
+    const es_gi_kernels* kernels;
+    uint32_t grain;
+} points_loop;
+
+static void shade_points(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const points_loop* loop = user;
+    const es_shade_points* p = loop->points;
+    es_shade_batch* batch = &loop->batches[worker];
+    for (uint32_t i = begin; i < end; i++) {
+        const uint32_t first = i * loop->grain, count = p->count - first < loop->grain ? p->count - first : loop->grain, lanes = (count + 7) / 8 * 8;
+        float* const to[] = {batch->px, batch->py, batch->pz, batch->nx, batch->ny, batch->nz};
+        const float* const from[] = {p->x, p->y, p->z, p->nx, p->ny, p->nz};
+        for (int k = 0; k < 6; k++) memcpy(to[k], from[k] + first, lanes * sizeof(float));
+        for (int k = 0; k < 3; k++) {
+            batch->e[k] = (float*)batch->words[k][0];
+            memset(batch->e[k], 0, lanes * sizeof(float));
+        }
+        loop->kernels->shade_points(loop->job, loop->lights, 0, loop->job->vpl_count - loop->job->dark_count, batch, lanes);
+        for (int k = 0; k < 3; k++) memcpy(p->irradiance[k] + first, batch->e[k], count * sizeof(float));
+    }
+}
+
+es_result es_shade_at_points(es_context* context, es_arena* arena, const es_shade_job* job, const es_shade_points* points)
+{
+    const uint32_t workers = es_context_workers(context), lit = job->vpl_count - job->dark_count;
+    es_shade_light* lights = es_arena_allocate(arena, ((size_t)lit + 1) * sizeof *lights);
+    es_shade_batch* batches = lights ? es_arena_allocate(arena, (size_t)workers * sizeof *batches) : NULL;
+    if (!batches) return es_context_last_result(context);
+    for (uint32_t v = 0; v < lit; v++) lights[v] = light_of(&job->vpls[v], 1.0f, job->spread, job->lobe_roughness);
+    /* each point adds up the lights in their order, whatever the batch: one for each worker where they hold that much, for lights' maps come from
+     * memory for every batch */
+    const uint32_t share = ((points->count + workers - 1) / workers + 7) / 8 * 8;
+    points_loop loop = {job, lights, points, batches, es_gi_kernel_table(es_context_isa(context)), share < ES_SHADE_LANES ? share : ES_SHADE_LANES};
+    if (points->count) es_parallel_for(context, (points->count + loop.grain - 1) / loop.grain, 1, shade_points, &loop);
+    return ES_OK;
+}

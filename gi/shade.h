@@ -80,6 +80,16 @@ typedef struct es_shade_job {
 
 es_result es_shade(es_context* context, es_arena* arena, const es_shade_job* job);
 
+/* The same lights, all of them, at points that are not pixels: irradiance, W/m². Of the job what says what lights are and where they reach is used:
+ * vpls, vpl_count, dark_count, maps and what belongs to them, spread, geometry_bound, lobe_roughness. Lights found visible by rays are not. */
+typedef struct es_shade_points {
+    const float *x, *y, *z, *nx, *ny, *nz; /* readable up to the next multiple of eight */
+    uint32_t count;
+    float* irradiance[3];
+} es_shade_points;
+
+es_result es_shade_at_points(es_context* context, es_arena* arena, const es_shade_job* job, const es_shade_points* points);
+
 /* The surface with its lobe widened to `lobe_roughness`, as a light's surface and a pixel's are before shading. */
 es_surface es_widened_lobe(es_surface surface, float lobe_roughness);
 

@@ -35,4 +35,25 @@ VINL void es_lobe_albedo_v(const es_lobe_albedo* table, const es_surface_v* s, v
     for (int k = 0; k < 3; k++) albedo[k] = vf_and(~unlit, albedo[k]);
 }
 
+/* Share of light from everywhere that the whole surface reflects. */
+VINL void es_surface_albedo_v(const es_lobe_albedo* table, const es_surface_v* s, vf albedo[3])
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f), last = vf_set1((float)(ES_LOBE_ROWS - 1));
+    const vm phong = vi_eq(s->model, vi_set1(ES_SURFACE_PHONG)), unlit = vi_eq(s->model, vi_set1(ES_SURFACE_UNLIT));
+    vf row = last * vf_clamp(s->roughness, zero, one);
+    if (vm_any(phong)) row = vf_select(phong, last * vf_sqrt(vf_clamp(s->roughness * vf_set1(1.0f / ES_LOBE_MAX_EXPONENT), zero, one)), row);
+    const vi r = vi_truncate(vf_min(row, vf_set1((float)(ES_LOBE_ROWS - 2)))), next = r + vi_set1(1);
+    row = row - vf_from_int(r);
+    const vf f90 = vf_min(vf_set1(25.0f) * vf_max(s->specular[0], vf_max(s->specular[1], s->specular[2])), one);
+    const vf through = one - f90 * vf_set1(0.04f + 0.96f / 21.0f);
+    vf low = vf_gather(table->mean_low, r), high = vf_gather(table->mean_high, r), share = vf_gather(table->mean_phong, r);
+    low = low + (vf_gather(table->mean_low, next) - low) * row;
+    high = f90 * (high + (vf_gather(table->mean_high, next) - high) * row);
+    share = share + (vf_gather(table->mean_phong, next) - share) * row;
+    for (int k = 0; k < 3; k++) {
+        const vf metal = s->albedo[k] * (through * through) + s->specular[k] * low + high;
+        albedo[k] = vf_and(~unlit, vf_select(phong, s->albedo[k] + s->specular[k] * share, metal));
+    }
+}
+
 #endif

@@ -498,3 +498,14 @@ void ES_KERNEL(es_gi_shade)(const es_shade_job* job, const es_shade_light* light
             else memset(row, 0, width * sizeof *row);
         }
 }
+
+void ES_KERNEL(es_gi_shade_points)(const es_shade_job* job, const es_shade_light* lights, uint32_t begin, uint32_t end, es_shade_batch* batch, uint32_t lanes)
+{
+    const size_t map_texels = (size_t)job->map_size * job->map_size;
+    for (uint32_t v = begin; v < end; v++) {
+        const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
+        if (lights[v].glossy) apply_light(job, &lights[v], map, batch, lanes, map ? SHADOW_BY_MAP : NO_SHADOW, true, false, ALL_PIXELS);
+        else if (map) apply_diffuse(job, &lights[v], map, v + 1 < end ? map + map_texels : map, batch, lanes, true, false);
+        else apply_diffuse(job, &lights[v], NULL, NULL, batch, lanes, false, false);
+    }
+}

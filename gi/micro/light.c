@@ -28,7 +28,7 @@ static void chunks(void* user, uint32_t begin, uint32_t end, uint32_t worker)
     for (uint32_t t = tree_of(f, leaf); leaf < last; t++) {
         const es_point_tree* tree = &f->trees[t];
         const size_t tree_end = tree->first_leaf + tree->leaf_count, to = tree_end < last ? tree_end : last;
-        const es_leaf_range range = {leaf, tree->first + tree->leaf_count + (leaf - tree->first_leaf), (uint32_t)(to - leaf)};
+        const es_leaf_range range = {leaf, tree->first + tree->leaf_count + (leaf - tree->first_leaf), (uint32_t)(to - leaf), t};
         loop->body(loop->user, &range, worker);
         leaf = to;
     }
