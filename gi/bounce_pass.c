@@ -5,20 +5,24 @@
 #include "gi/bounces.h"
 #include "gi/classic.h"
 #include "gi/indirect.h"
+#include "gi/micro_passes.h"
 #include "gi/passes.h"
 
 /* Sets of points for the senders, together about as many as Knecht's scenes have (§5.1: 32k). */
 enum { POINT_SUBSETS = 128 };
 
-uint32_t es_bounce_capacity(const es_renderer_settings* s) { return s->vpls + (s->bounces > 1 ? (s->bounces - 1) * s->bounce_vpls : 0); }
+/* Those that virtual point lights make: all, or all but the last, which micro-buffers gather. */
+static uint32_t bounces_of(const es_renderer_settings* s) { return s->method == ES_GI_MICRO ? es_micro_vpl_bounces(s) : s->bounces; }
+
+uint32_t es_bounce_capacity(const es_renderer_settings* s) { return s->vpls + (bounces_of(s) > 1 ? (bounces_of(s) - 1) * s->bounce_vpls : 0); }
 
 uint32_t es_bounce_room(const es_renderer* r) { return r->first_vpls + es_bounce_capacity(&r->settings) - r->settings.vpls; }
 
-bool es_bounce_wants_points(const es_renderer_settings* s) { return s->bounces > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_REFLECTIVE; }
+bool es_bounce_wants_points(const es_renderer_settings* s) { return bounces_of(s) > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_REFLECTIVE; }
 
 bool es_bounce_wants_rays(const es_renderer_settings* s)
 {
-    return s->bounces > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_ONE_PASS && s->bounce_rays && (s->method == ES_GI_ISM || s->method == ES_GI_CLASSIC);
+    return bounces_of(s) > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_ONE_PASS && s->bounce_rays && (s->method == ES_GI_ISM || s->method == ES_GI_CLASSIC);
 }
 
 uint32_t es_bounce_end(const es_renderer* r, uint32_t bounces)
@@ -92,9 +96,10 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->first_vpls ? "the lights reach nothing" : s->bounces < 2 ? "bounces is 1" : !s->bounce_vpls ? "bounce.vpls is 0" : NULL;
+    const uint32_t bounces = bounces_of(s);
+    const char* why = in->no_vpls ? in->no_vpls : !r->first_vpls ? "the lights reach nothing" : bounces < 2 ? "bounces is 1" : !s->bounce_vpls ? "bounce.vpls is 0" : NULL;
     r->stats.bounces = r->bounces;
-    r->stats.bounce_count = in->no_indirect ? 0 : s->bounces > 1 && !why ? s->bounces : 1;
+    r->stats.bounce_count = in->no_vpls ? 0 : bounces > 1 && !why ? bounces : 1;
     r->bounces[0].vpls = r->first_vpls;
     if (why) {
         r->vpl_count = r->first_vpls;
@@ -107,7 +112,7 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
-    uint32_t words[] = {s->bounces, s->bounce_method, s->bounce_vpls, s->bounce_points, s->bounce_rays, s->method, s->seed, s->interleave, s->glossy_vpls, s->traced_bias, s->ism_size, s->pull_push, s->pull_push_levels, r->first_vpls};
+    uint32_t words[] = {bounces, s->bounce_method, s->bounce_vpls, s->bounce_points, s->bounce_rays, s->method, s->seed, s->interleave, s->glossy_vpls, s->traced_bias, s->ism_size, s->pull_push, s->pull_push_levels, r->first_vpls};
     es_plan_reads(plan, words, sizeof words);
     float numbers[] = {s->ism_bias, s->ism_slope_bias, s->lobe_roughness, s->push_threshold, in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -115,11 +120,11 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
         const es_scene_points* points;
         r->vpl_count = r->first_vpls;
         es_result result = prepare_points(r, in, &points);
-        for (uint32_t b = 2; b <= s->bounces && !result; b++) result = add_bounce(r, in, points, b);
+        for (uint32_t b = 2; b <= bounces && !result; b++) result = add_bounce(r, in, points, b);
         if (result) return result;
         es_plan_done(plan, ES_PASS_BOUNCES, r->vpl_count - r->first_vpls);
     }
-    r->vpl_count = r->first_vpls + (s->bounces - 1) * s->bounce_vpls;
+    r->vpl_count = r->first_vpls + (bounces - 1) * s->bounce_vpls;
     sum_power(r);
     return ES_OK;
 }
@@ -170,8 +175,33 @@ static float on_grid_of(float whole, float a)
     return (float)((((double)a / grid + magic) - magic) * grid);
 }
 
+/* Light that is gathered holds all bounces at once. */
+static es_result gathered_image(es_renderer* r, uint32_t bounce, es_image* image)
+{
+    const uint32_t bounces = r->frame.settings.micro_light == ES_MICRO_LIGHT_DIRECT ? 1 : r->frame.settings.bounces;
+    if (!es_indirect_is_there(r) || bounce > bounces) return ES_OK; /* black */
+    if (bounces > 1) return es_fail(r->context, ES_IMAGE_UNKNOWN, "image indirect-%u: micro-buffers gather all %u bounces at once; with bounces 1 there is indirect-1", bounce, bounces);
+    es_planes sum = {0};
+    es_result result = es_planes_resize(r->context, &sum, &r->gbuffer);
+    if (result) return result;
+    es_compose_job job = es_renderer_compose_job(r);
+    job.lit = r->specular.lit;
+    for (int k = 0; k < 3; k++) {
+        job.irradiance[k] = r->irradiance.at[k];
+        job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;
+        job.indirect[k] = sum.at[k];
+    }
+    es_compose(r->context, &job);
+    for (uint32_t y = 0; y < image->height; y++)
+        for (uint32_t x = 0; x < image->width; x++)
+            for (int k = 0; k < 3; k++) image->pixels[((size_t)y * image->width + x) * 3 + (size_t)k] = sum.at[k][(size_t)y * r->gbuffer.stride + x];
+    es_planes_free(r->context, &sum);
+    return ES_OK;
+}
+
 es_result es_bounce_image(es_renderer* r, uint32_t bounce, es_image* image)
 {
+    if (r->frame.settings.method == ES_GI_MICRO) return gathered_image(r, bounce, image);
     if (bounce > r->stats.bounce_count) return ES_OK; /* black */
     es_planes whole = {0}, sum = {0}, before = {0};
     es_result result = first_bounces(r, (uint32_t)r->stats.bounce_count, &whole);

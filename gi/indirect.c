@@ -23,7 +23,7 @@ static bool material_has_lobe(const es_material_desc* m)
     return es_surface_has_lobe(&surface) || (m->model == ES_SURFACE_METALLIC_ROUGHNESS && m->metallic_roughness_texture.image);
 }
 
-static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
+bool es_frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
 {
     for (uint32_t i = 0; i < renderer->vpl_count; i++)
         if (renderer->vpls[i].glossy) return true;
@@ -32,8 +32,24 @@ static bool frame_has_lobes(const es_renderer* renderer, const es_draw_list* lis
     return false;
 }
 
+bool es_indirect_is_there(const es_renderer* r) { return r->plan.valid[ES_PASS_SHADING] || r->plan.valid[ES_PASS_MICRO]; }
+
+void es_indirect_reads(es_plan* plan)
+{
+    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_plan_reads_pass(plan, ES_PASS_MICRO);
+    es_plan_reads_pass(plan, ES_PASS_MICRO_UPSAMPLE);
+}
+
+const char* es_indirect_nothing(const es_renderer* r, const es_frame_inputs* in)
+{
+    return in->no_indirect ? in->no_indirect : r->settings.method != ES_GI_MICRO && !r->vpl_count ? "the lights reach nothing" : NULL;
+}
+
+bool es_indirect_is_halved(const es_renderer_settings* s) { return s->half_resolution && s->method != ES_GI_MICRO; }
+
 /* What the indirect light is shaded and filtered on. */
-const es_gbuffer* es_indirect_gbuffer(const es_renderer* r) { return r->frame.settings.half_resolution ? &r->half : &r->gbuffer; }
+const es_gbuffer* es_indirect_gbuffer(const es_renderer* r) { return es_indirect_is_halved(&r->frame.settings) ? &r->half : &r->gbuffer; }
 
 /* At every pixel, whatever the setting of the pattern. */
 static bool every_light(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED && !s->traced_interleave; }
@@ -84,11 +100,13 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    if (in->no_indirect || !r->vpl_count) {
-        es_plan_not_needed(plan, ES_PASS_SHADING, in->no_indirect ? in->no_indirect : "the lights reach nothing");
+    const char* why = es_indirect_nothing(r, in);
+    if (!why && s->method == ES_GI_MICRO) why = "gi is micro";
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_SHADING, why);
         return ES_OK;
     }
-    r->has_specular = frame_has_lobes(r, in->list);
+    r->has_specular = es_frame_has_lobes(r, in->list);
     es_plan_begin(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_VPLS);
@@ -140,7 +158,8 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    const char* nothing = es_indirect_nothing(r, in);
+    const char* why = nothing ? nothing : s->method == ES_GI_MICRO ? "gi is micro: nothing is interleaved" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
     r->filter_passes = why ? 0 : s->filter_passes;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_FILTER, why);
@@ -198,7 +217,8 @@ es_result es_pass_upsample(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->half_resolution ? "half-resolution is off" : NULL;
+    const char* nothing = es_indirect_nothing(r, in);
+    const char* why = nothing ? nothing : s->method == ES_GI_MICRO ? "gi is micro: micro.spacing takes its place" : !s->half_resolution ? "half-resolution is off" : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_UPSAMPLE, why);
         return ES_OK;

@@ -24,6 +24,16 @@ void es_indirect_unblended(const es_renderer* renderer, const es_planes** irradi
 const es_planes* es_indirect_irradiance(const es_renderer* renderer);
 const es_planes* es_indirect_specular(const es_renderer* renderer);
 
+/* Has any pass left light in the renderer's planes? And what later passes read of those that may. */
+bool es_indirect_is_there(const es_renderer* renderer);
+void es_indirect_reads(es_plan* plan);
+/* Why there is none; NULL: there is some. Once the lights are placed. */
+const char* es_indirect_nothing(const es_renderer* renderer, const es_frame_inputs* in);
+/* At half the resolution? */
+bool es_indirect_is_halved(const es_renderer_settings* settings);
+/* May a surface or a virtual point light of the frame have a lobe? */
+bool es_frame_has_lobes(const es_renderer* renderer, const es_draw_list* list);
+
 es_result es_pass_shading(es_renderer* renderer, const es_frame_inputs* in);
 es_result es_pass_filter(es_renderer* renderer, const es_frame_inputs* in);
 es_result es_pass_upsample(es_renderer* renderer, const es_frame_inputs* in);

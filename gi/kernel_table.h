@@ -14,6 +14,7 @@
 #include "gi/micro/gather.h"
 #include "gi/micro/light.h"
 #include "gi/micro/point_level.h"
+#include "gi/micro/upsample.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
 #include "gi/shade.h"
@@ -35,6 +36,7 @@
     X(shade_points, (const es_shade_job* job, const es_shade_light* lights, uint32_t begin, uint32_t end, es_shade_batch* batch, uint32_t lanes)) \
     /* a smaller image to the whole one's rows [row_begin, row_end) */                                         \
     X(upsample, (const es_upsample_job* job, uint32_t row_begin, uint32_t row_end))                            \
+    X(micro_upsample, (const es_micro_upsample_job* job, uint32_t row_begin, uint32_t row_end))                \
     X(shade, (const es_shade_job* job, const es_shade_light* lights, const es_shade_block* block, es_shade_batch* batch)) \
     /* gi/bounces.h */                                                                                           \
     X(bounce_weights, (const es_bounce_sender* sender, const es_surfel_set* points, float* weights, float* sums)) \

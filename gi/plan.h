@@ -18,8 +18,12 @@
     X(CLASSIC, "classic shadow maps", "maps")                                                                    \
     X(HIERARCHY, "ray hierarchy", "triangles")                                                                   \
     X(BOUNCES, "bounces", "lights")                                                                              \
+    X(FOREST, "point hierarchy", "points")                                                                       \
+    X(POINT_LIGHT, "point light", "points")                                                                      \
     X(DIRECT, "direct", "lights")                                                                                \
     X(SHADING, "shading", "samples")                                                                             \
+    X(MICRO, "micro-buffers", "samples")                                                                         \
+    X(MICRO_UPSAMPLE, "micro-buffer upsampling", "pixels gathered afresh")                                       \
     X(COMPENSATION, "bias compensation", "samples")                                                              \
     X(FILTER, "filter", "pixels")                                                                                \
     X(TEMPORAL, "temporal coherence", "pixels")                                                                  \

@@ -8,6 +8,7 @@
 #include "gi/direct.h"
 #include "gi/indirect.h"
 #include "gi/lit.h"
+#include "gi/micro_passes.h"
 #include "gi/passes.h"
 #include "platform/context.h"
 #include "platform/maths.h"
@@ -96,6 +97,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->specular);
     es_planes_free(context, &renderer->compensation);
     es_history_free(context, &renderer->history);
+    es_micro_free_planes(context, &renderer->micro);
     es_planes_free(context, &renderer->filtered_irradiance);
     es_planes_free(context, &renderer->filtered_specular);
 }
@@ -118,6 +120,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_surfels_free(context, &renderer->surfels);
     es_ism_maps_free(context, &renderer->maps);
     es_trace_scene_free(&renderer->trace_scene);
+    es_micro_free(context, &renderer->micro);
     es_arena_free(&renderer->arena);
     if (renderer->rasterizer) es_rasterizer_destroy(renderer->rasterizer);
     es_release(context, renderer, sizeof *renderer);
@@ -237,7 +240,7 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
     }
     es_result result = reserve_lights(r, in->light_count);
     if (result) return result;
-    es_light_view_sizes sizes = {r->settings.shadow_size, r->settings.light_size, in->no_indirect == NULL, r->settings.stable_vpls};
+    es_light_view_sizes sizes = {r->settings.shadow_size, r->settings.light_size, in->no_vpls == NULL, r->settings.stable_vpls};
     for (uint32_t i = 0; i < in->light_count && !result; i++) result = es_light_view_prepare(r->context, &r->light_views[i], &in->lights[i], sizes, in->bounds_min, in->bounds_max);
     if (result) return result;
 
@@ -246,8 +249,8 @@ static es_result pass_light_views(es_renderer* r, const es_frame_inputs* in)
     reads_light_poses(plan, in);
     result = draw_light_views(r, in, ES_PASS_SHADOW_MAPS, ES_LIGHT_SHADOW);
     if (result) return result;
-    if (in->no_indirect) {
-        es_plan_not_needed(plan, ES_PASS_LIGHT_VIEWS, in->no_indirect);
+    if (in->no_vpls) {
+        es_plan_not_needed(plan, ES_PASS_LIGHT_VIEWS, in->no_vpls);
         return ES_OK;
     }
     es_plan_begin(plan, ES_PASS_LIGHT_VIEWS);
@@ -267,8 +270,8 @@ static uint64_t scene_hash(const es_frame_inputs* in)
 static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_world* world, uint32_t picture)
 {
     es_plan* plan = &r->plan;
-    if (in->no_indirect) {
-        es_plan_not_needed(plan, ES_PASS_VPLS, in->no_indirect);
+    if (in->no_vpls) {
+        es_plan_not_needed(plan, ES_PASS_VPLS, in->no_vpls);
         r->vpl_count = r->first_vpls = 0;
         return ES_OK;
     }
@@ -346,7 +349,7 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* none = in->no_indirect ? in->no_indirect : r->first_vpls ? NULL : "the lights reach nothing";
+    const char* none = in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
     const bool points = !none && (s->method == ES_GI_ISM || es_bounce_wants_points(s));
     if (!points) es_plan_not_needed(plan, ES_PASS_POINTS, none ? none : "gi is not ism");
     if (none || s->method != ES_GI_ISM) es_plan_not_needed(plan, ES_PASS_ISM, none ? none : "gi is not ism");
@@ -420,8 +423,8 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     job.lit = specular->lit;
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
-        if (r->plan.valid[ES_PASS_SHADING]) job.irradiance[k] = irradiance->at[k];
-        if (r->plan.valid[ES_PASS_SHADING] && r->has_specular) job.specular[k] = specular->at[k];
+        if (es_indirect_is_there(r)) job.irradiance[k] = irradiance->at[k];
+        if (es_indirect_is_there(r) && r->has_specular) job.specular[k] = specular->at[k];
         if (r->plan.valid[ES_PASS_COMPENSATION]) job.compensation[k] = r->compensation.at[k];
         if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
@@ -435,7 +438,7 @@ static void pass_compose(es_renderer* r)
     es_plan_begin(plan, ES_PASS_COMPOSE);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
-    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_indirect_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
     es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
@@ -462,8 +465,10 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = pass_maps(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
     if (!result) result = es_pass_bounces(r, in);
+    if (!result) result = es_pass_points(r, in);
     if (!result) result = pass_direct(r, in);
     if (!result) result = es_pass_shading(r, in);
+    if (!result) result = es_pass_micro(r, in);
     if (!result) result = es_pass_compensation(r, in);
     const bool first = r->settings.temporal_stage == ES_TEMPORAL_BEFORE_FILTER;
     if (!result && first) result = es_pass_temporal(r, in);
@@ -471,6 +476,16 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result && !first) result = es_pass_temporal(r, in);
     if (!result) result = es_pass_upsample(r, in);
     return result ? result : es_pass_antialias(r, picture);
+}
+
+static void why_no_light(const es_renderer_settings* s, es_frame_inputs* in)
+{
+    in->no_indirect = s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in->light_count ? "no light is on" : !in->has_geometry ? "nothing to light" : NULL;
+    in->no_vpls = in->no_indirect;
+    if (s->method == ES_GI_NONE) in->no_indirect = in->no_vpls = "gi is none";
+    if (s->method != ES_GI_MICRO) return;
+    if (!in->no_vpls && !es_micro_vpl_bounces(s)) in->no_vpls = "gi is micro";
+    in->no_indirect = es_micro_nothing(in, s);
 }
 
 static es_result render(es_renderer* r, es_world* world)
@@ -488,7 +503,7 @@ static es_result render(es_renderer* r, es_world* world)
     in.has_geometry = es_world_bounds(world, &in.bounds_min, &in.bounds_max);
     in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-9f) : 1.0f;
     const es_renderer_settings* s = &r->settings;
-    in.no_indirect = s->method == ES_GI_NONE ? "gi is none" : s->method == ES_GI_MICRO ? "micro-buffers have no points yet" : s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in.light_count ? "no light is on" : !in.has_geometry ? "nothing to light" : NULL;
+    why_no_light(s, &in);
 
     r->frame = (es_frame_settings){*s, in.extent};
     result = es_history_begin(r, &in, world);

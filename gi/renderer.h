@@ -8,6 +8,8 @@
 #include "gi/history.h"
 #include "gi/ism.h"
 #include "gi/light_view.h"
+#include "gi/micro/light.h"
+#include "gi/micro/micro.h"
 #include "gi/plan.h"
 #include "gi/reference/scene.h"
 #include "gi/scene_points.h"
@@ -19,6 +21,16 @@
 
 /* What the last frame was, or this one is being, rendered with: images are made of it after the settings have changed. */
 typedef struct es_frame_settings { es_renderer_settings settings; float extent; } es_frame_settings;
+
+/* What micro-buffers are drawn of, and planes of theirs besides the renderer's (gi/micro_passes.h). */
+typedef struct es_micro_buffers {
+    es_point_forest forest;
+    es_lobe_albedo lobes;
+    uint32_t spacing;          /* that the next two have pixels for */
+    es_planes sparse_irradiance, sparse_specular;
+    es_planes fresh_irradiance, fresh_specular;   /* of this frame alone, where the renderer's are means over several */
+    es_micro_stats stats;      /* of this frame */
+} es_micro_buffers;
 
 struct es_renderer {
     es_context* context;
@@ -50,6 +62,7 @@ struct es_renderer {
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */
 
     es_trace_scene trace_scene; /* of traced methods */
+    es_micro_buffers micro;
 
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;
@@ -75,6 +88,7 @@ typedef struct es_frame_inputs {
     float extent;            /* diagonal of the world's bounds, metres */
     bool has_geometry;
     const char* no_indirect; /* why there is no indirect light; NULL: there is */
+    const char* no_vpls;     /* why there are no virtual point lights; NULL: there are, if light reaches anything */
 } es_frame_inputs;
 
 /* es_renderer_settings.geometry_bound of this world, 1/m² */

@@ -164,7 +164,7 @@ static es_result blend(es_renderer* r, const es_frame_inputs* in)
     es_result result = es_planes_resize(r->context, &h->irradiance[to], shaded);
     if (!result && r->has_specular) result = es_planes_resize(r->context, &h->specular[to], shaded);
     if (result) return result;
-    const bool redrawn = !r->plan.stats[ES_PASS_VISIBILITY].skipped, half = s->half_resolution;
+    const bool redrawn = !r->plan.stats[ES_PASS_VISIBILITY].skipped, half = es_indirect_is_halved(s);
     es_temporal_job job = {.gbuffer = shaded, .previous = redrawn ? half ? &h->half : &h->gbuffer : shaded, .moving = h->moving, .plane_count = r->has_specular ? 6 : 3,
         .base = s->temporal_base, .position = s->temporal_position, .normal = s->temporal_normal, .illumination = s->temporal_illumination, .extent = in->extent, .exposure_scale = es_exp2(s->exposure),
         .depth_threshold = s->temporal_depth_threshold, .normal_threshold = s->temporal_normal_threshold, .clamp = s->temporal_clamp};
@@ -205,7 +205,8 @@ es_result es_pass_temporal(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = in->no_indirect ? in->no_indirect : !r->vpl_count ? "the lights reach nothing" : !s->temporal ? "temporal is off" : NULL;
+    const char* nothing = es_indirect_nothing(r, in);
+    const char* why = nothing ? nothing : !s->temporal ? "temporal is off" : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_TEMPORAL, why);
         r->history.planes = 0;
@@ -213,7 +214,7 @@ es_result es_pass_temporal(es_renderer* r, const es_frame_inputs* in)
     }
     es_plan_begin(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
-    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_indirect_reads(plan);
     if (s->temporal_stage == ES_TEMPORAL_AFTER_FILTER) es_plan_reads_pass(plan, ES_PASS_FILTER);
     /* until it is settled, each frame's result is another */
     const uint64_t frame = r->history.settled ? 0 : r->frames + 1;

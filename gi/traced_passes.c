@@ -8,9 +8,9 @@
 es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world* world)
 {
     es_plan* plan = &r->plan;
-    const bool wanted = es_bounce_wants_rays(&r->settings) || r->settings.method == ES_GI_VPL_TRACED || r->settings.method == ES_GI_VPL_SAMPLED || r->settings.traced_bias == ES_TRACED_COMPENSATED ||
+    const bool wanted = r->settings.method == ES_GI_MICRO ? es_bounce_wants_rays(&r->settings) : es_bounce_wants_rays(&r->settings) || r->settings.method == ES_GI_VPL_TRACED || r->settings.method == ES_GI_VPL_SAMPLED || r->settings.traced_bias == ES_TRACED_COMPENSATED ||
         (r->settings.near_distance > 0.0f && r->settings.traced_bias == ES_TRACED_BOUNDED);
-    const char* why = !wanted ? "nothing is found by rays" : in->no_indirect ? in->no_indirect : r->first_vpls ? NULL : "the lights reach nothing";
+    const char* why = !wanted ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_HIERARCHY, why);
         es_trace_scene_free(&r->trace_scene);
@@ -31,7 +31,7 @@ es_result es_pass_compensation(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = !plan->valid[ES_PASS_HIERARCHY] ? plan->stats[ES_PASS_HIERARCHY].skipped : s->traced_bias != ES_TRACED_COMPENSATED ? "traced.bias is not compensated" : NULL;
+    const char* why = s->method == ES_GI_MICRO ? "gi is micro" : !plan->valid[ES_PASS_HIERARCHY] ? plan->stats[ES_PASS_HIERARCHY].skipped : s->traced_bias != ES_TRACED_COMPENSATED ? "traced.bias is not compensated" : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_COMPENSATION, why);
         return ES_OK;

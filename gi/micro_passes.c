@@ -1,0 +1,270 @@
+#include "gi/micro_passes.h"
+
+#include <string.h>
+
+#include "gi/indirect.h"
+#include "gi/lit.h"
+#include "gi/micro/light.h"
+#include "gi/micro/pixels.h"
+#include "gi/micro/upsample.h"
+#include "platform/random.h"
+
+static bool is_micro(const es_renderer* r) { return r->settings.method == ES_GI_MICRO; }
+
+static bool something_glows(const es_draw_list* list)
+{
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        const float* e = list->materials[list->instances[i].material].emission;
+        if (e[0] > 0.0f || e[1] > 0.0f || e[2] > 0.0f) return true;
+    }
+    return false;
+}
+
+const char* es_micro_nothing(const es_frame_inputs* in, const es_renderer_settings* s)
+{
+    if (s->bounces == 0) return "bounces is 0";
+    if (!in->has_geometry) return "nothing to light";
+    if (in->light_count) return NULL;
+    return !s->micro_emission ? "no light is on" : something_glows(in->list) ? NULL : "no light is on and nothing glows";
+}
+
+uint32_t es_micro_vpl_bounces(const es_renderer_settings* s) { return s->method == ES_GI_MICRO && s->micro_light == ES_MICRO_LIGHT_VPLS && s->bounces > 1 ? s->bounces - 1 : 0; }
+
+void es_micro_free_planes(es_context* context, es_micro_buffers* micro)
+{
+    es_planes_free(context, &micro->sparse_irradiance);
+    es_planes_free(context, &micro->sparse_specular);
+    es_planes_free(context, &micro->fresh_irradiance);
+    es_planes_free(context, &micro->fresh_specular);
+}
+
+void es_micro_free(es_context* context, es_micro_buffers* micro)
+{
+    es_micro_free_planes(context, micro);
+    es_forest_free(context, &micro->forest);
+}
+
+/* ---- points ------------------------------------------------------------------------------------------------------------------ */
+
+static es_result bring_forest(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_forest_request request = {.points = r->settings.micro_points, .rebuild = r->settings.micro_rebuild};
+    es_plan_begin(plan, ES_PASS_FOREST);
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
+    es_plan_reads(plan, &request, sizeof request);
+    if (!es_plan_run(plan, ES_PASS_FOREST)) return ES_OK;
+    es_forest_update update = {0};
+    es_result result = es_forest_bring(r->context, &r->micro.forest, in->list, in->revisions.materials, &request, &update);
+    if (!result) es_plan_done(plan, ES_PASS_FOREST, update.points);
+    return result;
+}
+
+static es_result light_points(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    es_plan_begin(plan, ES_PASS_POINT_LIGHT);
+    es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
+    es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
+    es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
+    float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_POINT_LIGHT)) return ES_OK;
+    if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
+    const es_point_light_job job = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
+        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes};
+    es_result result = es_points_light_direct(r->context, &r->micro.forest, &job);
+    if (result) return result;
+    es_forest_pull(r->context, &r->micro.forest);
+    es_plan_done(plan, ES_PASS_POINT_LIGHT, r->micro.forest.leaf_count);
+    return ES_OK;
+}
+
+es_result es_pass_points(es_renderer* r, const es_frame_inputs* in)
+{
+    const char* why = !is_micro(r) ? "gi is not micro" : in->no_indirect;
+    if (why) {
+        es_plan_not_needed(&r->plan, ES_PASS_FOREST, why);
+        es_plan_not_needed(&r->plan, ES_PASS_POINT_LIGHT, why);
+        es_micro_free(r->context, &r->micro);
+        return ES_OK;
+    }
+    es_result result = bring_forest(r, in);
+    return result ? result : light_points(r, in);
+}
+
+/* ---- gathering -------------------------------------------------------------------------------------------------------------------- */
+
+/* Of what lobes reflect (gi/micro/upsample.h); the thesis' previews of glossy surfaces have it as well. */
+static uint32_t lobe_spacing(const es_renderer_settings* s) { return s->micro_spacing < 2 ? s->micro_spacing : 2; }
+
+static uint32_t turn_of(const es_renderer* r)
+{
+    const es_history* h = &r->history;
+    const es_renderer_settings* s = &r->settings;
+    if (s->antialias != ES_ANTIALIAS_NONE) return h->place;
+    if (!s->temporal) return 0;
+    return h->still ? h->still < s->temporal_settle ? h->still : s->temporal_settle : (uint32_t)r->frames;
+}
+
+static bool accumulates(const es_renderer* r) { return r->settings.temporal && r->settings.antialias == ES_ANTIALIAS_NONE && r->settings.temporal_settle > 1 && r->history.still > 1; }
+
+static es_micro_pixels pixels_of(const es_renderer* r, uint32_t kind)
+{
+    return (es_micro_pixels){.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(turn_of(r)) + r->settings.seed};
+}
+
+static es_micro_settings settings_of(const es_renderer_settings* s)
+{
+    return (es_micro_settings){.size = s->micro_size, .cut = s->micro_cut, .ray_cast = s->micro_ray_cast, .warp = s->micro_warp, .quantised = s->micro_nodes == ES_MICRO_QUANTISED};
+}
+
+static es_result gather(es_renderer* r, es_micro_pixels* pixels, es_planes* planes, uint64_t* gathered)
+{
+    es_arena_reset(&r->arena);
+    for (int k = 0; k < 3; k++) pixels->result[k] = planes->at[k];
+    const es_micro_settings settings = settings_of(&r->settings);
+    return es_micro_gather_pixels(r->context, &r->arena, &r->micro.forest, &settings, pixels, &r->micro.stats, gathered);
+}
+
+static es_result gather_sparsely(es_renderer* r, uint32_t kind, uint32_t spacing, es_planes* planes, uint64_t* gathered)
+{
+    const uint32_t width = es_micro_sparse(r->gbuffer.width, spacing), height = es_micro_sparse(r->gbuffer.height, spacing);
+    const es_gbuffer size = {.width = width, .height = height, .stride = (width + 7) / 8 * 8};
+    es_result result = es_planes_resize(r->context, planes, &size);
+    if (result) return result;
+    es_micro_pixels pixels = pixels_of(r, kind);
+    pixels.spacing = spacing;
+    pixels.stride = size.stride;
+    return gather(r, &pixels, planes, gathered);
+}
+
+static es_result gather_fully(es_renderer* r, uint32_t kind, es_planes* planes, uint64_t* gathered)
+{
+    es_micro_pixels pixels = pixels_of(r, kind);
+    pixels.stride = r->gbuffer.stride;
+    pixels.lit = kind == ES_GATHER_LOBE ? planes->lit : NULL;
+    return gather(r, &pixels, planes, gathered);
+}
+
+static es_result interpolate(es_renderer* r, uint32_t kind, uint32_t spacing, const es_planes* sparse, es_planes* planes, uint64_t* gathered)
+{
+    const es_gbuffer* g = &r->gbuffer;
+    const size_t bytes = (size_t)es_micro_list_stride(g->width) * g->height;
+    uint8_t* listed = es_allocate(r->context, bytes);
+    if (!listed) return es_context_last_result(r->context);
+    const uint32_t width = es_micro_sparse(g->width, spacing);
+    es_micro_upsample_job job = {.gbuffer = g, .rays = r->rays, .kind = kind, .spacing = spacing, .sparse_width = width, .sparse_height = es_micro_sparse(g->height, spacing), .sparse_stride = (width + 7) / 8 * 8,
+        .lit = kind == ES_GATHER_LOBE ? planes->lit : NULL, .listed = listed};
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = sparse->at[k];
+        job.result[k] = planes->at[k];
+    }
+    es_micro_upsample(r->context, &job);
+    es_micro_pixels pixels = pixels_of(r, kind);
+    pixels.listed = listed;
+    pixels.stride = g->stride;
+    es_result result = gather(r, &pixels, planes, gathered);
+    es_release(r->context, listed, bytes);
+    return result;
+}
+
+typedef struct mean_loop { const es_planes* fresh; es_planes* mean; size_t floats; float share; } mean_loop;
+
+enum { MEAN_GRAIN = 1 << 14 };
+
+static void add_to_mean(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const mean_loop* loop = user;
+    const size_t from = (size_t)begin * MEAN_GRAIN, all = (size_t)end * MEAN_GRAIN, to = all < loop->floats ? all : loop->floats;
+    for (int k = 0; k < 3; k++) {
+        const float* fresh = loop->fresh->at[k];
+        float* mean = loop->mean->at[k];
+        for (size_t i = from; i < to; i++) mean[i] += (fresh[i] - mean[i]) * loop->share;
+    }
+}
+
+/* The mean over the still frames so far. A settled one is complete: what was gathered once more, as where no work is skipped, is in it. */
+static void accumulate(es_renderer* r, const es_planes* fresh, es_planes* mean, bool lobes)
+{
+    if (r->history.resting) return;
+    mean_loop loop = {fresh, mean, (size_t)r->gbuffer.stride * r->gbuffer.height, 1.0f / (float)r->history.still};
+    es_parallel_for(r->context, (uint32_t)((loop.floats + MEAN_GRAIN - 1) / MEAN_GRAIN), 1, add_to_mean, &loop);
+    const size_t chunks = (size_t)es_lit_chunks(r->gbuffer.stride) * r->gbuffer.height;
+    for (size_t i = 0; i < chunks && lobes; i++) mean->lit[i] |= fresh->lit[i] & 1;
+}
+
+static es_result gather_all(es_renderer* r, es_planes* irradiance, es_planes* specular)
+{
+    es_result result = es_planes_resize(r->context, irradiance, &r->gbuffer);
+    if (!result && r->has_specular) result = es_planes_resize(r->context, specular, &r->gbuffer);
+    uint64_t gathered = 0;
+    const es_renderer_settings* s = &r->settings;
+    if (s->micro_spacing != r->micro.spacing) {
+        es_planes_free(r->context, &r->micro.sparse_irradiance);
+        es_planes_free(r->context, &r->micro.sparse_specular);
+        r->micro.spacing = s->micro_spacing;
+    }
+    if (s->micro_spacing == 1) {
+        if (!result) result = gather_fully(r, ES_GATHER_DIFFUSE, irradiance, &gathered);
+        if (!result && r->has_specular) result = gather_fully(r, ES_GATHER_LOBE, specular, &gathered);
+        return result;
+    }
+    if (!result) result = gather_sparsely(r, ES_GATHER_DIFFUSE, s->micro_spacing, &r->micro.sparse_irradiance, &gathered);
+    if (!result && r->has_specular) result = gather_sparsely(r, ES_GATHER_LOBE, lobe_spacing(s), &r->micro.sparse_specular, &gathered);
+    return result;
+}
+
+static es_result fill(es_renderer* r, es_planes* irradiance, es_planes* specular, uint64_t* gathered)
+{
+    const es_renderer_settings* s = &r->settings;
+    es_result result = interpolate(r, ES_GATHER_DIFFUSE, s->micro_spacing, &r->micro.sparse_irradiance, irradiance, gathered);
+    if (!result && r->has_specular) result = interpolate(r, ES_GATHER_LOBE, lobe_spacing(s), &r->micro.sparse_specular, specular, gathered);
+    return result;
+}
+
+es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = !is_micro(r) ? "gi is not micro" : in->no_indirect;
+    if (why || s->micro_spacing == 1) es_plan_not_needed(plan, ES_PASS_MICRO_UPSAMPLE, why ? why : "micro.spacing is 1");
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_MICRO, why);
+        return ES_OK;
+    }
+    r->has_specular = es_frame_has_lobes(r, in->list);
+    const bool several = accumulates(r);
+    es_planes *irradiance = several ? &r->micro.fresh_irradiance : &r->irradiance, *specular = several ? &r->micro.fresh_specular : &r->specular;
+
+    es_plan_begin(plan, ES_PASS_MICRO);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_POINT_LIGHT);
+    es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
+    const uint32_t words[] = {s->micro_size, s->micro_spacing, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->has_specular, s->seed, turn_of(r), several};
+    es_plan_reads(plan, words, sizeof words);
+    es_plan_reads(plan, &s->micro_cut, sizeof s->micro_cut);
+    bool gathered_now = es_plan_run(plan, ES_PASS_MICRO);
+    if (gathered_now) {
+        r->micro.stats = (es_micro_stats){0};
+        es_result result = gather_all(r, irradiance, specular);
+        if (result) return result;
+        es_plan_done(plan, ES_PASS_MICRO, r->micro.stats.samples);
+    }
+    if (s->micro_spacing > 1) {
+        es_plan_begin(plan, ES_PASS_MICRO_UPSAMPLE);
+        es_plan_reads_pass(plan, ES_PASS_MICRO);
+        gathered_now = es_plan_run(plan, ES_PASS_MICRO_UPSAMPLE);
+        uint64_t afresh = 0;
+        es_result result = gathered_now ? fill(r, irradiance, specular, &afresh) : ES_OK;
+        if (result) return result;
+        if (gathered_now) es_plan_done(plan, ES_PASS_MICRO_UPSAMPLE, afresh);
+    }
+    if (several && gathered_now) {
+        accumulate(r, irradiance, &r->irradiance, false);
+        if (r->has_specular) accumulate(r, specular, &r->specular, true);
+    }
+    return ES_OK;
+}

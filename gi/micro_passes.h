@@ -1,0 +1,24 @@
+/* The passes of micro-buffers: what ES_GI_MICRO has in place of lights, maps and shading. Their light goes to the renderer's planes, `irradiance` and
+ * `specular`, at every pixel, from where history and composition take it as any other.
+ *
+ * With `temporal` each frame's buffers are turned otherwise. While nothing changes, frame k of these has turn k and the mean over all turns since is
+ * what is blended with last frame's light, so that a settled picture is the mean over temporal_settle frames, whatever was before. With
+ * anti-aliasing a turn goes with each place inside of the pixels. */
+#ifndef EARTHSHINE_GI_MICRO_PASSES_H
+#define EARTHSHINE_GI_MICRO_PASSES_H
+
+#include "gi/renderer.h"
+
+/* Why nothing is gathered, NULL: there is something. */
+const char* es_micro_nothing(const es_frame_inputs* in, const es_renderer_settings* settings);
+/* Of the virtual point lights that light the points, if they do: how many bounces they make. 0: there are none. */
+uint32_t es_micro_vpl_bounces(const es_renderer_settings* settings);
+
+/* After the shadow maps. Hierarchy, then light. */
+es_result es_pass_points(es_renderer* renderer, const es_frame_inputs* in);
+/* Gathering and interpolation. */
+es_result es_pass_micro(es_renderer* renderer, const es_frame_inputs* in);
+void es_micro_free_planes(es_context* context, es_micro_buffers* micro);
+void es_micro_free(es_context* context, es_micro_buffers* micro);
+
+#endif
