@@ -1,4 +1,4 @@
-/* Interleaved shading, the geometry-aware filter and the way up from half the resolution: every instruction set against scalar, bit for bit, on random G-buffers of odd
+/* Interleaved shading, the geometry-aware filter and the ways up from lower resolutions: every instruction set against scalar, bit for bit, on random G-buffers of odd
  * sizes with extreme values, with guards round what is written.
  *
  * check_gi --time prints milliseconds for 1024 x 768 pixels and 1024 lights of every kernel and instruction set instead. */
@@ -16,6 +16,8 @@
 #include "gi/filter.h"
 #include "gi/half_resolution.h"
 #include "gi/kernel_table.h"
+#include "gi/lit.h"
+#include "gi/micro/upsample.h"
 #include "gi/shade.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -269,6 +271,76 @@ static void check_upsample_leaves_the_unseen(void** state)
     free_gbuffer(&half);
 }
 
+/* ---- from gathered pixels (gi/micro/upsample.h) ---------------------------------------------------------------------------------------- */
+
+static void check_micro_upsample(void** state)
+{
+    (void)state;
+    for (uint32_t trial = 0; trial < 64; trial++) {
+        const uint32_t width = 1 + random_bits() % 60, height = 1 + random_bits() % 20, spacing = trial % 2 ? 2 : 4, kind = trial / 2 % 2;
+        const uint32_t sparse_width = (width + spacing - 1) / spacing, sparse_height = (height + spacing - 1) / spacing, sparse_stride = (sparse_width + 7) / 8 * 8;
+        es_gbuffer g = new_gbuffer(width, height);
+        const size_t count = (size_t)g.stride * height, few = (size_t)sparse_stride * sparse_height, bytes = (size_t)(width + 7) / 8 * height, chunks = es_lit_chunks(g.stride) * (size_t)height;
+        /* most surfaces are alike: otherwise every pixel would be one to be gathered at */
+        for (size_t i = 0; i < count; i++) {
+            if (random_bits() % 4) g.surface[i] = 0x00ff8000u;
+            if (trial % 4 == 3 && random_bits() % 2) g.surface[i] = (uint32_t)ES_SURFACE_PHONG << 24 | 0x00402000u;
+        }
+        g.geometric_normal = g.normal;
+        es_micro_upsample_job job = {.gbuffer = &g, .rays = random_rays(trial % 5 == 1, width, height), .kind = kind, .spacing = spacing, .sparse_width = sparse_width, .sparse_height = sparse_height, .sparse_stride = sparse_stride};
+        plane source[3], expected[3], result[3], lists[2] = {new_plane((bytes + 3) / 4), new_plane((bytes + 3) / 4)}, lit[2] = {new_plane((chunks + 3) / 4), new_plane((chunks + 3) / 4)};
+        for (int k = 0; k < 3; k++) {
+            source[k] = new_plane(few);
+            for (size_t i = 0; i < few; i++) at(source[k])[i] = random_bits() % 50 ? uniform(0, 10) : uniform(0, 1e30f);
+            job.source[k] = at(source[k]);
+            expected[k] = new_plane(count);
+            result[k] = new_plane(count);
+        }
+        for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
+            if (!(es_isa_available_mask() >> isa & 1)) continue;
+            const int other = isa != ES_ISA_SCALAR;
+            plane* to = other ? result : expected;
+            for (int k = 0; k < 3; k++) job.result[k] = at(to[k]);
+            job.listed = (uint8_t*)at(lists[other]);
+            job.lit = trial % 3 ? (uint8_t*)at(lit[other]) : NULL;
+            es_gi_kernel_table((es_isa)isa)->micro_upsample(&job, 0, height);
+            for (int k = 0; k < 3; k++) {
+                check_guards(to[k]);
+                check_equal(&g, expected[k], to[k], "upsampled");
+            }
+            check_guards(lists[other]);
+            check_guards(lit[other]);
+            assert_memory_equal(at(lists[0]), at(lists[other]), bytes);
+            if (job.lit) assert_memory_equal(at(lit[0]), at(lit[other]), chunks);
+        }
+        uint32_t kept = 0;
+        for (uint32_t y = 0; y < height; y++)
+            for (uint32_t x = 0; x < width; x++) {
+                const size_t i = (size_t)y * g.stride + x;
+                const es_surface s = es_surface_of_gbuffer(g.albedo_rg[i], g.albedo_b[i], g.surface[i]);
+                const bool lit_by = g.depth[i] > 0.0f && (kind == ES_GATHER_LOBE ? es_surface_has_lobe(&s) : es_maxf(s.albedo.x, es_maxf(s.albedo.y, s.albedo.z)) > 0.0f);
+                const bool listed = ((const uint8_t*)at(lists[0]))[(size_t)y * ((width + 7) / 8) + x / 8] >> x % 8 & 1, there = x % spacing == 0 && y % spacing == 0;
+                if (!lit_by || listed) assert_true(at(expected[0])[i] == 0.0f && (lit_by || !listed));
+                if (!lit_by || !there) continue;
+                /* what was gathered stays what it is */
+                assert_false(listed);
+                for (int k = 0; k < 3; k++) assert_memory_equal(&at(expected[k])[i], &at(source[k])[y / spacing * sparse_stride + x / spacing], 4);
+                kept++;
+            }
+        if (width * height > 200) assert_true(kept > 0);
+        for (int k = 0; k < 3; k++) {
+            free(source[k].memory);
+            free(expected[k].memory);
+            free(result[k].memory);
+        }
+        for (int k = 0; k < 2; k++) {
+            free(lists[k].memory);
+            free(lit[k].memory);
+        }
+        free_gbuffer(&g);
+    }
+}
+
 static void time_all(void)
 {
     enum { COUNT = 1024, SIZE = 128, REPEAT = 3 };
@@ -317,6 +389,7 @@ int main(int argc, char** argv)
         cmocka_unit_test(check_filter),
         cmocka_unit_test(check_upsample),
         cmocka_unit_test(check_upsample_leaves_the_unseen),
+        cmocka_unit_test(check_micro_upsample),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
