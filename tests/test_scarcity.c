@@ -686,15 +686,23 @@ static uint64_t dynamic_hash(bench* w, const operation* o, void* object)
 
 static void renderer_destroy(bench* w, const operation* o, void* object) { es_renderer_destroy(object); }
 
-/* Kinds beyond the methods: light that is kept in time, with three bounces by the one-pass method or by reflective maps. */
-enum { IN_TIME = 6 };
+/* Kinds beyond the methods: light that is kept in time, with three bounces by the one-pass method or by reflective maps; micro-buffers. */
+enum { IN_TIME = 6, MICRO = IN_TIME + 2 };
 
 static es_result frame(bench* w, const operation* o, void** object)
 {
     es_renderer_settings settings = small_settings();
     settings.method = (uint32_t)(o->kind < 4 ? o->kind : o->kind < IN_TIME ? ES_GI_VPL_TRACED : ES_GI_ISM);
     settings.traced_bias = (uint32_t)(o->kind < 4 || o->kind >= IN_TIME ? 0 : o->kind - 3);
-    if (o->kind >= IN_TIME) {
+    if (o->kind >= MICRO) {
+        settings.method = ES_GI_MICRO;
+        settings.micro_spacing = 2;
+        settings.micro_points = 256;
+        settings.micro_size = 8;
+        settings.temporal = o->kind > MICRO;
+        settings.bounces = o->kind > MICRO ? 3 : 1;
+        settings.bounce_vpls = 8;
+    } else if (o->kind >= IN_TIME) {
         settings.temporal = settings.stable_vpls = true;
         settings.antialias = ES_ANTIALIAS_TEMPORAL;
         settings.bounces = 3;
@@ -890,6 +898,9 @@ static const operation operations[] = {
     {"frame, compensated", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, 5},
     {"frame, in time", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, IN_TIME},
     {"frame, reflective", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, IN_TIME + 1},
+    {"frame, micro", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, MICRO},
+    {"frame, micro bounces", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, MICRO + 1},
+    {"next frame, micro", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, MICRO},
     {"next frame, in time", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, IN_TIME},
     {"next frame, ism", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, ES_GI_ISM},
     {"next frame, compensated", WORLD, next_frame_prepare, next_frame, frame_hash, renderer_destroy, NULL, 5},

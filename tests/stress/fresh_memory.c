@@ -16,7 +16,7 @@ static void* allocate(void* user, size_t size, size_t alignment)
 
 static void release(void* user, void* pointer, size_t size) { free(pointer); }
 
-enum { METHODS = 9, IMAGES_MAX = 64 };
+enum { METHODS = 11, IMAGES_MAX = 64 };
 
 static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
 {
@@ -28,12 +28,15 @@ static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
     stress_room(&s);
     /* odd sizes leave padding in rows, and phases and blocks that are not full */
     for (uint32_t i = 0; i < METHODS; i++) {
-        es_renderer_settings settings = stress_settings(i == 8 ? 1 : 53, i == 8 ? 3 : 37, i < 4 ? i : i < 6 ? ES_GI_VPL_TRACED : i == 6 ? ES_GI_VPL_SAMPLED : ES_GI_ISM);
+        es_renderer_settings settings = stress_settings(i == 8 ? 1 : 53, i == 8 ? 3 : 37, i < 4 ? i : i < 6 ? ES_GI_VPL_TRACED : i == 6 ? ES_GI_VPL_SAMPLED : i > 8 ? ES_GI_MICRO : ES_GI_ISM);
         settings.vpls = 70;
         settings.interleave = 3;
         settings.traced_bias = i == 4 ? ES_TRACED_UNBOUNDED : i == 5 ? ES_TRACED_COMPENSATED : ES_TRACED_BOUNDED;
         settings.traced_samples = 2;
         settings.half_resolution = i >= 6;
+        settings.micro_spacing = i == 10 ? 4 : 1;
+        settings.micro_points = 1000;
+        settings.micro_size = 12;
         settings.near_distance = i == 6 ? 0.1f : 0.0f;
         es_renderer* renderer = stress_render(&s, &settings);
         assert_all_finite(&s, renderer, "fresh memory");

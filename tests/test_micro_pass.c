@@ -1,0 +1,374 @@
+/* Whole frames of micro-buffers: that skipping, threads, instruction sets and what was rendered before change no bit, that what is interpolated is
+ * close to what is gathered and what is gathered afresh is equal to it, that history settles on a mean, and that frames with next to nothing in them come out. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "gi/gi.h"
+#include "platform/context.h"
+#include "platform/maths.h"
+#include "tests/races.h"
+
+#if defined(__SANITIZE_THREAD__)
+enum { WIDTH = 26, HEIGHT = 18, POINTS = 512 };
+#else
+enum { WIDTH = 72, HEIGHT = 52, POINTS = 4096 };
+#endif
+
+typedef struct stage { es_context* context; es_world* world; es_renderer* renderer; es_renderer_settings settings; } stage;
+
+static es_renderer_settings small_settings(uint32_t spacing)
+{
+    es_renderer_settings s = es_default_renderer_settings();
+    s.width = WIDTH;
+    s.height = HEIGHT;
+    s.method = ES_GI_MICRO;
+    s.shadow_size = 128;
+    s.light_size = 64;
+    s.vpls = 24;
+    s.interleave = 2;
+    s.ism_size = 32;
+    s.ism_points = 256;
+    s.ism_pool = 4096;
+    s.micro_size = 8;
+    s.micro_points = POINTS;
+    s.micro_spacing = spacing;
+    return s;
+}
+
+static stage open_stage(const char* scene, uint32_t threads, uint32_t isa_mask, const es_renderer_settings* settings)
+{
+    stage s = {.settings = *settings};
+    es_context_desc desc = es_default_context_desc();
+    desc.threads = threads;
+    if (isa_mask) desc.isa_mask = isa_mask;
+    assert_int_equal(es_context_create(&desc, &s.context), ES_OK);
+    assert_int_equal(es_world_create_scene(s.context, scene, NULL, &s.world), ES_OK);
+    assert_int_equal(es_renderer_create(s.context, &s.settings, &s.renderer), ES_OK);
+    return s;
+}
+static void close_stage(stage* s)
+{
+    es_renderer_destroy(s->renderer);
+    es_world_destroy(s->world);
+    assert_int_equal(es_context_bytes(s->context), 0);
+    es_context_destroy(s->context);
+}
+static void render(stage* s) { assert_int_equal(es_renderer_render(s->renderer, s->world), ES_OK); }
+static void step(stage* s, float dt) { assert_int_equal(es_world_step(s->world, dt), ES_OK); }
+static void configure(stage* s) { assert_int_equal(es_renderer_configure(s->renderer, &s->settings), ES_OK); }
+
+static es_image image_of(stage* s, const char* name)
+{
+    es_image image;
+    assert_int_equal(es_renderer_image(s->renderer, name, &image), ES_OK);
+    return image;
+}
+static uint64_t hash_of(stage* s, const char* name)
+{
+    es_image image = image_of(s, name);
+    uint64_t hash = es_image_hash(&image);
+    es_image_destroy(s->context, &image);
+    return hash;
+}
+static uint64_t all_of(stage* s) { return hash_of(s, "display") ^ hash_of(s, "irradiance") * 3 ^ hash_of(s, "indirect") * 5 ^ hash_of(s, "confidence") * 7; }
+
+static const es_pass_stats* pass_of(stage* s, const char* name)
+{
+    const es_frame_stats* stats = es_renderer_stats(s->renderer);
+    for (size_t i = 0; i < stats->pass_count; i++)
+        if (!strcmp(stats->passes[i].name, name)) return &stats->passes[i];
+    fail_msg("there is no pass %s", name);
+    return NULL;
+}
+
+static double difference(const es_image* a, const es_image* b)
+{
+    double squares = 0, sum = 0;
+    const size_t count = (size_t)a->width * a->height * a->channels;
+    for (size_t i = 0; i < count; i++) {
+        const double d = (double)a->pixels[i] - (double)b->pixels[i];
+        squares += d * d;
+        sum += (double)b->pixels[i];
+    }
+    return sqrt(squares / (double)count) / (sum / (double)count);
+}
+
+static void move_camera(stage* s, float x)
+{
+    es_camera_desc camera;
+    es_transform transform;
+    assert_int_equal(es_world_get_camera(s->world, es_world_active_camera(s->world), &camera), ES_OK);
+    assert_int_equal(es_world_get_node_transform(s->world, camera.node, &transform), ES_OK);
+    transform.translation.x += x;
+    assert_int_equal(es_world_set_node_transform(s->world, camera.node, &transform), ES_OK);
+}
+static void scale_light(stage* s, float factor)
+{
+    uint32_t id;
+    size_t count = 1;
+    assert_int_equal(es_world_enumerate(s->world, ES_OBJECT_LIGHT, &id, &count), ES_OK);
+    es_light_desc light;
+    assert_int_equal(es_world_get_light(s->world, (es_light){id}, &light), ES_OK);
+    light.intensity *= factor;
+    assert_int_equal(es_world_set_light(s->world, (es_light){id}, &light), ES_OK);
+}
+
+/* ---- the same bits --------------------------------------------------------------------------------------------------- */
+
+enum { FRAMES = 14 };
+
+/* Movement, standing still past settling, a moved camera, changed light, other settings, another method and back. */
+static void run(const char* scene, uint32_t threads, uint32_t isa_mask, bool skip, uint32_t spacing, bool temporal, uint32_t antialias, uint64_t hashes[FRAMES])
+{
+    es_renderer_settings settings = small_settings(spacing);
+    settings.skip = skip;
+    settings.temporal = temporal;
+    settings.temporal_settle = 3;
+    settings.antialias = antialias;
+    settings.antialias_samples = 3;
+    stage s = open_stage(scene, threads, isa_mask, &settings);
+    for (int i = 0; i < FRAMES; i++) {
+        if (i > 0) step(&s, i < 3 || i == 13 ? 1.0f / 30 : 0.0f);
+        if (i == 8) move_camera(&s, 0.02f);
+        if (i == 9) scale_light(&s, 1.5f);
+        if (i == 10) s.settings.method = ES_GI_ISM;
+        if (i == 11) s.settings.method = ES_GI_MICRO;
+        if (i == 12) s.settings.bounces = 2;
+        if (i >= 10) configure(&s);
+        render(&s);
+        hashes[i] = all_of(&s);
+    }
+    close_stage(&s);
+}
+
+static void test_same_bits(void** state)
+{
+    (void)state;
+    static const struct { const char* scene; uint32_t spacing; bool temporal; uint32_t antialias; } variants[] = {
+        {"cornell", 1, false, ES_ANTIALIAS_NONE}, {"room", 4, true, ES_ANTIALIAS_NONE}, {"cornell", 2, false, ES_ANTIALIAS_TEMPORAL}, {"cornell", 4, false, ES_ANTIALIAS_SUPERSAMPLE}};
+    for (size_t v = 0; v < sizeof variants / sizeof *variants; v++) {
+        const uint32_t spacing = variants[v].spacing, antialias = variants[v].antialias;
+        const bool temporal = variants[v].temporal;
+        uint64_t expected[FRAMES], other[FRAMES];
+        run(variants[v].scene, 1, 0, true, spacing, temporal, antialias, expected);
+        run(variants[v].scene, 2, 0, false, spacing, temporal, antialias, other);
+        for (int i = 0; i < FRAMES; i++)
+            if (expected[i] != other[i]) fail_msg("variant %zu: frame %d differs without skipping and on two threads", v, i);
+        run(variants[v].scene, 1, 1u << ES_ISA_SCALAR, true, spacing, temporal, antialias, other);
+        for (int i = 0; i < FRAMES; i++)
+            if (expected[i] != other[i]) fail_msg("variant %zu: frame %d differs with the scalar kernels", v, i);
+        for (int i = 8; i < 12; i++) assert_true(expected[i] != expected[i - 1]);
+    }
+}
+
+/* Other methods and settings in between leave nothing. */
+static void test_switching(void** state)
+{
+    (void)state;
+    es_renderer_settings settings = small_settings(1);
+    stage s = open_stage("room", 1, 0, &settings);
+    static const uint32_t methods[] = {ES_GI_MICRO, ES_GI_NONE, ES_GI_MICRO, ES_GI_ISM, ES_GI_MICRO};
+    static const uint32_t spacings[] = {1, 2, 4, 1, 2};
+    for (int i = 0; i < 5; i++) {
+        s.settings.method = methods[i];
+        s.settings.micro_spacing = spacings[i];
+        s.settings.width = WIDTH + (i == 2 ? 9 : 0);
+        s.settings.micro_points = i == 4 ? POINTS / 2 : POINTS;
+        configure(&s);
+        render(&s);
+        stage fresh = open_stage("room", 1, 0, &s.settings);
+        render(&fresh);
+        if (all_of(&s) != all_of(&fresh)) fail_msg("frame %d is not what it is alone", i);
+        close_stage(&fresh);
+    }
+    close_stage(&s);
+}
+
+static void test_two_renderers(void** state)
+{
+    (void)state;
+    es_renderer_settings settings = small_settings(1), other = small_settings(4);
+    stage s = open_stage("cornell", 1, 0, &settings);
+    stage second = s;
+    other.micro_points = POINTS / 4;
+    assert_int_equal(es_renderer_create(s.context, &other, &second.renderer), ES_OK);
+    render(&s);
+    render(&second);
+    const uint64_t first_hash = all_of(&s), second_hash = all_of(&second);
+    assert_true(first_hash != second_hash);
+    settings.skip = other.skip = false;
+    assert_int_equal(es_renderer_configure(s.renderer, &settings), ES_OK);
+    assert_int_equal(es_renderer_configure(second.renderer, &other), ES_OK);
+    render(&second);
+    render(&s);
+    assert_true(all_of(&s) == first_hash && all_of(&second) == second_hash);
+    es_renderer_destroy(second.renderer);
+    close_stage(&s);
+}
+
+/* ---- interpolation ------------------------------------------------------------------------------------------------------ */
+
+static void test_interpolation(void** state)
+{
+    (void)state;
+    es_renderer_settings settings = small_settings(1);
+    settings.micro_size = 24; /* noise would be larger than what interpolation leaves out */
+    stage s = open_stage("cornell", 1, 0, &settings);
+    render(&s);
+    es_image full = image_of(&s, "irradiance"), depth = image_of(&s, "depth");
+    assert_int_equal(pass_of(&s, "micro-buffer upsampling")->skipped != NULL, 1);
+    const uint64_t samples = pass_of(&s, "micro-buffers")->count;
+    assert_true(samples > 0);
+    for (uint32_t spacing = 2; spacing <= 4; spacing *= 2) {
+        s.settings.micro_spacing = spacing;
+        configure(&s);
+        render(&s);
+        es_image sparse = image_of(&s, "irradiance");
+        const es_pass_stats* up = pass_of(&s, "micro-buffer upsampling");
+        assert_null(up->skipped);
+        uint64_t equal = 0, gathered = 0, lit = 0;
+        for (uint32_t y = 0; y < HEIGHT; y++)
+            for (uint32_t x = 0; x < WIDTH; x++) {
+                const size_t i = ((size_t)y * WIDTH + x) * 3;
+                const bool same = !memcmp(sparse.pixels + i, full.pixels + i, 3 * sizeof(float)), there = depth.pixels[i / 3] > 0.0f && full.pixels[i] > 0.0f;
+                lit += there;
+                equal += there && same;
+                if (x % spacing || y % spacing) continue;
+                gathered += there;
+                if (!same) fail_msg("spacing %u: pixel (%u, %u) was gathered at and differs", spacing, x, y);
+            }
+        /* edges are there, and little else */
+        assert_true(up->count > 0 && up->count < lit / 3);
+        if (equal < gathered + up->count) fail_msg("spacing %u: %llu pixels of %llu are what they are with spacing 1, of which %llu were gathered at and %llu afresh", spacing, (unsigned long long)equal,
+            (unsigned long long)lit, (unsigned long long)gathered, (unsigned long long)up->count);
+        const double error = difference(&sparse, &full);
+        if (!(error < (spacing == 2 ? 0.06 : 0.09))) fail_msg("spacing %u: relRMSE %.4f", spacing, error);
+        assert_true(pass_of(&s, "micro-buffers")->count < samples / (spacing * spacing) * 5 / 4);
+        es_image_destroy(s.context, &sparse);
+    }
+    es_image_destroy(s.context, &full);
+    es_image_destroy(s.context, &depth);
+    close_stage(&s);
+}
+
+/* ---- history ---------------------------------------------------------------------------------------------------------------- */
+
+/* A settled picture is the mean over its still frames, whatever was before, and less noisy than one of them. */
+static void test_settles(void** state)
+{
+    (void)state;
+    es_renderer_settings settings = small_settings(1);
+    settings.temporal = true;
+    settings.temporal_settle = 16;
+    stage s = open_stage("cornell", 1, 0, &settings), moved = open_stage("cornell", 1, 0, &settings);
+    render(&s);
+    es_image single = image_of(&s, "irradiance");
+    move_camera(&moved, 0.1f);
+    render(&moved);
+    move_camera(&moved, -0.1f);
+    for (uint32_t i = 0; i < settings.temporal_settle + 3; i++) {
+        render(&s);
+        render(&moved);
+    }
+    const es_frame_stats* stats = es_renderer_stats(s.renderer);
+    for (size_t i = 0; i < stats->pass_count; i++)
+        if (!stats->passes[i].skipped) fail_msg("%s runs though the picture has settled", stats->passes[i].name);
+    es_image settled = image_of(&s, "irradiance");
+    assert_true(hash_of(&s, "irradiance") == hash_of(&moved, "irradiance") && hash_of(&s, "display") == hash_of(&moved, "display"));
+
+    s.settings.temporal = false;
+    s.settings.micro_size = 32;
+    configure(&s);
+    render(&s);
+    es_image fine = image_of(&s, "irradiance");
+    const double alone = difference(&single, &fine), mean = difference(&settled, &fine);
+    if (!(mean < 0.7 * alone)) fail_msg("a frame is %.4f from one of 16 times the samples, the settled one %.4f", alone, mean);
+    es_image_destroy(s.context, &single);
+    es_image_destroy(s.context, &settled);
+    es_image_destroy(s.context, &fine);
+    close_stage(&s);
+    close_stage(&moved);
+}
+
+/* ---- next to nothing ---------------------------------------------------------------------------------------------------------- */
+
+static void assert_finite(stage* s)
+{
+    es_image image = image_of(s, "radiance");
+    for (size_t i = 0; i < (size_t)image.width * image.height * image.channels; i++) assert_true(isfinite(image.pixels[i]) && image.pixels[i] >= 0.0f);
+    es_image_destroy(s->context, &image);
+}
+
+static void test_little(void** state)
+{
+    (void)state;
+    for (uint32_t i = 0; i < 6; i++) {
+        es_renderer_settings settings = small_settings(i % 2 ? 4 : 1);
+        if (i < 2) settings.width = settings.height = 1;
+        if (i == 2 || i == 3) settings.micro_points = 1;
+        stage s = open_stage("room", 1, 0, &settings);
+        if (i >= 4) move_camera(&s, i == 4 ? 1e4f : 3.0f); /* away from everything, or into a wall */
+        render(&s);
+        assert_finite(&s);
+        close_stage(&s);
+    }
+    /* nothing at all, and nothing that lights */
+    es_renderer_settings settings = small_settings(2);
+    stage s = open_stage("cornell", 1, 0, &settings);
+    scale_light(&s, 0.0f);
+    render(&s);
+    assert_finite(&s);
+    es_world_destroy(s.world);
+    assert_int_equal(es_world_create(s.context, NULL, &s.world), ES_OK);
+    es_node node;
+    es_camera camera;
+    assert_int_equal(es_world_add_node(s.world, &(es_node_desc){.transform = {.rotation = {0, 0, 0, 1}, .scale = {1, 1, 1}}}, &node), ES_OK);
+    es_camera_desc desc = es_default_camera_desc();
+    desc.node = node;
+    assert_int_equal(es_world_add_camera(s.world, &desc, &camera), ES_OK);
+    assert_int_equal(es_world_set_active_camera(s.world, camera), ES_OK);
+    render(&s);
+    assert_finite(&s);
+    assert_string_equal(pass_of(&s, "micro-buffers")->skipped, "nothing to light");
+    close_stage(&s);
+}
+
+static void test_refused(void** state)
+{
+    (void)state;
+    es_renderer_settings settings = small_settings(1);
+    stage s = open_stage("cornell", 1, 0, &settings);
+    s.settings.micro_spacing = 3;
+    assert_int_equal(es_renderer_configure(s.renderer, &s.settings), ES_SETTING_VALUE);
+    s.settings.micro_spacing = 4;
+    s.settings.micro_size = 10;
+    assert_int_equal(es_renderer_configure(s.renderer, &s.settings), ES_SETTING_VALUE);
+    s.settings.micro_size = 36;
+    assert_int_equal(es_renderer_configure(s.renderer, &s.settings), ES_SETTING_VALUE);
+    s.settings.micro_size = 12;
+    configure(&s);
+    render(&s);
+    /* one bounce is all there is, to the bit */
+    assert_true(hash_of(&s, "indirect-1") == hash_of(&s, "indirect") && hash_of(&s, "indirect-unfiltered") == hash_of(&s, "indirect"));
+    close_stage(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_same_bits),
+        unit_test_without_races(test_switching),
+        unit_test_without_races(test_two_renderers),
+        unit_test_without_races(test_interpolation),
+        unit_test_without_races(test_settles),
+        unit_test_without_races(test_little),
+        unit_test_without_races(test_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
