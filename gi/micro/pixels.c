@@ -138,7 +138,6 @@ es_result es_micro_gather_pixels(es_context* context, es_arena* arena, const es_
         if (result) return result;
         es_parallel_for(context, rows, 8, put_results, &loop);
         stats->samples += batch.samples;
-        stats->visited += batch.visited;
         stats->drawn += batch.drawn;
         stats->cast += batch.cast;
         *gathered += count;
