@@ -7,23 +7,35 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 
+/* Shirley and Chiu 1997; (u, v) is not 0. */
+static void disc_of(float u, float v, float* x, float* y)
+{
+    const bool wide = es_absf(u) >= es_absf(v);
+    const float rho = wide ? u : v;
+    float sine, cosine;
+    es_sincos(0.25f * ES_PI * (wide ? v / u : u / v), &sine, &cosine);
+    *x = rho * (wide ? cosine : sine);
+    *y = rho * (wide ? sine : cosine);
+}
+
+static float middle(uint32_t i, uint32_t count) { return ((float)i + 0.5f) * (2.0f / (float)count) - 1.0f; }
+
 static void fill_table(uint32_t size, es_micro_table* table)
 {
     *table = (es_micro_table){.size = size, .stride = es_micro_stride(size)};
     for (uint32_t row = 0; row < size; row++)
         for (uint32_t column = 0; column < size; column++) {
             const uint32_t at = row * table->stride + column;
-            /* Shirley and Chiu 1997; no pixel's middle is at 0 */
-            const float u = ((float)column + 0.5f) * (2.0f / (float)size) - 1.0f, v = ((float)row + 0.5f) * (2.0f / (float)size) - 1.0f;
-            const bool wide = es_absf(u) >= es_absf(v);
-            const float rho = wide ? u : v;
-            float sine, cosine;
-            es_sincos(0.25f * ES_PI * (wide ? v / u : u / v), &sine, &cosine);
-            table->x[at] = rho * (wide ? cosine : sine);
-            table->y[at] = rho * (wide ? sine : cosine);
-            table->z[at] = es_sqrt(1.0f - rho * rho);
+            disc_of(middle(column, size), middle(row, size), &table->x[at], &table->y[at]);
+            table->z[at] = es_sqrt(es_maxf(1.0f - table->x[at] * table->x[at] - table->y[at] * table->y[at], 0.0f));
             const float a = 1.0f - table->z[at], a2 = a * a;
             table->interface[at] = 0.04f + 0.96f * (a2 * a2 * a);
+        }
+    for (uint32_t i = 0; i < ES_MICRO_GRID; i++)
+        for (uint32_t j = 0; j < ES_MICRO_GRID; j++) {
+            const uint32_t at = i * ES_MICRO_GRID + j, last = ES_MICRO_GRID - 1, side = i == 0 || j == 0 || i == last || j == last ? 2 : 1;
+            table->grid[at].count = side * side;
+            for (uint32_t k = 0; k < side * side; k++) disc_of(middle(i * side + k / side, ES_MICRO_GRID * side), middle(j * side + k % side, ES_MICRO_GRID * side), &table->grid[at].x[k], &table->grid[at].y[k]);
         }
 }
 
@@ -40,9 +52,9 @@ static uint32_t spread(uint32_t x)
     return (x | x << 2) & 0x09249249u;
 }
 
-typedef struct keying { const es_gather_point* points; keyed* keys; float low[3], scale; } keying;
+typedef struct keying { const es_gather_point* points; const es_micro_settings* settings; keyed* keys; float low[3], scale; } keying;
 
-/* Kind and part of the model first, as cells are of one sort; then the side of a cube that the normal is nearest to, since points in a cell should look the same
+/* The mapping first, as a cell has one; then the side of a cube that the normal is nearest to, since points in a cell should look the same
  * way; then the place. */
 static void make_keys(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
@@ -50,7 +62,7 @@ static void make_keys(void* user, uint32_t begin, uint32_t end, uint32_t worker)
     for (uint32_t i = begin; i < end; i++) {
         const es_gather_point* p = &job->points[i];
         const float x = es_absf(p->normal[0]), y = es_absf(p->normal[1]), z = es_absf(p->normal[2]);
-        const uint32_t axis = x >= y && x >= z ? 0 : y >= z ? 1 : 2, side = axis * 2 + (p->normal[axis] < 0.0f), sort = p->kind == ES_GATHER_DIFFUSE ? 0 : p->model == ES_SURFACE_PHONG ? 2 : 1;
+        const uint32_t axis = x >= y && x >= z ? 0 : y >= z ? 1 : 2, side = axis * 2 + (p->normal[axis] < 0.0f), sort = (uint32_t)es_micro_mapping_of(p, job->settings);
         uint32_t code = 0;
         for (int k = 0; k < 3; k++) code |= spread((uint32_t)es_clampf((p->position[k] - job->low[k]) * job->scale, 0.0f, 511.0f)) << k;
         job->keys[i] = (keyed){sort << 30 | side << 27 | code, i};
@@ -77,9 +89,9 @@ static void sort_keys(keyed* keys, keyed* other, size_t count)
 }
 
 /* Fills `order`, and `ends` with where each sort ends. */
-static es_result find_order(es_context* context, const es_gather_point* points, uint32_t count, uint32_t* order, uint32_t ends[3])
+static es_result find_order(es_context* context, const es_micro_settings* settings, const es_gather_point* points, uint32_t count, uint32_t* order, uint32_t ends[3])
 {
-    keying job = {.points = points, .scale = 1.0f};
+    keying job = {.points = points, .settings = settings, .scale = 1.0f};
     keyed* keys = es_allocate_array(context, 2 * (size_t)count, sizeof *keys);
     if (!keys) return es_context_last_result(context);
     float high[3] = {0}, extent = 0.0f;
@@ -110,8 +122,7 @@ typedef struct gathering {
     es_micro_job job;
     const es_gi_kernels* kernels;
     es_micro_scratch* scratch;      /* one a worker */
-    uint32_t ends[3];
-    uint32_t cells_before[4];
+    uint32_t ends[ES_MICRO_MAPPINGS], cells_before[ES_MICRO_MAPPINGS + 1];
 } gathering;
 
 static void gather_cells(void* user, uint32_t begin, uint32_t end, uint32_t worker)
@@ -130,39 +141,57 @@ static float extent_of(const es_point_forest* forest)
     return forest->tree_count ? es_maxf(2.0f * forest->float_nodes[forest->top.first + 1].radius, 1e-9f) : 1.0f;
 }
 
-es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats)
+static es_result gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, uint32_t count, float* const result[3], es_micro_stats* stats, es_micro_pixel* picture)
 {
-    if (count > 0x7fffffffu) return es_fail(context, ES_INVALID_ARGUMENT, "light is gathered at up to 2^31 - 1 points at once; these are %zu", count);
-    if (stats) *stats = (es_micro_stats){0};
-    if (!count) return ES_OK;
-    if (!forest->tree_count) {
-        for (int k = 0; k < 3; k++) memset(result[k], 0, count * sizeof(float));
-        return ES_OK;
-    }
     const uint32_t workers = es_context_workers(context);
+    const size_t trees_all = (size_t)workers * forest->tree_count;
     es_micro_table* table = es_allocate(context, sizeof *table);
     uint32_t* order = es_allocate_array(context, count, sizeof *order);
     es_micro_scratch* scratch = es_allocate_array(context, workers, sizeof *scratch);
-    uint32_t* trees = es_allocate_array(context, (size_t)workers * forest->tree_count, sizeof *trees);
+    uint32_t* trees = es_allocate_array(context, trees_all, sizeof *trees);
     es_result made = table && order && scratch && trees ? ES_OK : es_context_last_result(context);
     gathering g = {.kernels = es_gi_kernel_table(es_context_isa(context)), .scratch = scratch};
-    if (!made) made = find_order(context, points, (uint32_t)count, order, g.ends);
+    if (!made) made = find_order(context, settings, points, count, order, g.ends);
     if (!made) {
         const float extent = extent_of(forest);
         fill_table(settings->size, table);
-        g.job = (es_micro_job){.forest = forest, .settings = *settings, .table = table, .points = points, .order = order, .inverse_square = 1.0f / (extent * extent), .result = {result[0], result[1], result[2]}};
-        for (uint32_t i = 0; i < workers; i++) scratch[i].stats = (es_micro_stats){0}, scratch[i].trees = trees + (size_t)i * forest->tree_count;
-        for (int sort = 0; sort < 3; sort++) g.cells_before[sort + 1] = g.cells_before[sort] + (g.ends[sort] - (sort ? g.ends[sort - 1] : 0) + ES_MICRO_CELL - 1) / ES_MICRO_CELL;
-        es_parallel_for(context, g.cells_before[3], 1, gather_cells, &g);
+        g.job = (es_micro_job){.forest = forest, .settings = *settings, .table = table, .points = points, .order = order, .inverse_square = 1.0f / (extent * extent), .result = {result[0], result[1], result[2]},
+            .picture = picture};
+        for (uint32_t i = 0; i < workers; i++) {
+            scratch[i].stats = (es_micro_stats){0};
+            scratch[i].trees = trees + (size_t)i * forest->tree_count;
+        }
+        for (int sort = 0; sort < ES_MICRO_MAPPINGS; sort++)
+            g.cells_before[sort + 1] = g.cells_before[sort] + (g.ends[sort] - (sort ? g.ends[sort - 1] : 0) + ES_MICRO_CELL - 1) / ES_MICRO_CELL;
+        es_parallel_for(context, g.cells_before[ES_MICRO_MAPPINGS], 1, gather_cells, &g);
         for (uint32_t i = 0; stats && i < workers; i++) {
             stats->samples += scratch[i].stats.samples;
             stats->drawn += scratch[i].stats.drawn;
             stats->cast += scratch[i].stats.cast;
         }
     }
-    es_release(context, trees, (size_t)workers * forest->tree_count * sizeof *trees);
+    es_release(context, trees, trees_all * sizeof *trees);
     es_release(context, scratch, workers * sizeof *scratch);
     es_release(context, order, count * sizeof *order);
     es_release(context, table, sizeof *table);
     return made;
+}
+
+es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats)
+{
+    if (count > 0x7fffffffu) return es_fail(context, ES_INVALID_ARGUMENT, "light is gathered at up to 2^31 - 1 points at once; these are %zu", count);
+    if (stats) *stats = (es_micro_stats){0};
+    if (!count) return ES_OK;
+    if (forest->tree_count) return gather(context, forest, settings, points, (uint32_t)count, result, stats, NULL);
+    for (int k = 0; k < 3; k++) memset(result[k], 0, count * sizeof(float));
+    return ES_OK;
+}
+
+es_result es_micro_look(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* point, es_micro_pixel* pixels)
+{
+    float sums[3];
+    float* const result[3] = {&sums[0], &sums[1], &sums[2]};
+    if (forest->tree_count) return gather(context, forest, settings, point, 1, result, NULL, pixels);
+    for (uint32_t i = 0; i < settings->size * settings->size; i++) pixels[i] = (es_micro_pixel){.node = UINT32_MAX};
+    return ES_OK;
 }

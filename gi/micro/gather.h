@@ -3,23 +3,55 @@
 #define EARTHSHINE_GI_MICRO_GATHER_H
 
 #include "gi/micro/micro.h"
+#include "gi/surface.h"
+#include "platform/maths.h"
 
 enum {
     ES_MICRO_LANES = 8,
     ES_MICRO_CELL = 64,           /* points that share a cut */
     ES_MICRO_PIXELS = ES_MICRO_MAX_SIZE * ES_MICRO_MAX_SIZE,
-    ES_MICRO_LANE = ES_MICRO_PIXELS + 48, /* words from one buffer to the next: not a multiple of what would put them all into the same sets of the cache */
+    ES_MICRO_MARGIN = ES_MICRO_MAX_SIZE + 8, /* empty words before and behind a buffer */
+    ES_MICRO_LANE = ES_MICRO_PIXELS + 2 * ES_MICRO_MARGIN, /* from one buffer to the next: not a multiple of what would put all into the same sets of a cache */
+    ES_MICRO_GRID = 16,           /* cells a side of what a lobe's density is tabulated on */
     ES_MICRO_MAX_CUT = 65528      /* nodes of a cut: their places take 16 bits, the last one is the empty pixel's */
 };
 
 /* Rows of a buffer begin at multiples of eight pixels; what is past a row's end stays empty. */
 static inline uint32_t es_micro_stride(uint32_t size) { return (size + 7) / 8 * 8; }
 
+/* How a point's pixels are distributed. All points of a cell have the same. */
+typedef enum es_micro_mapping { ES_MICRO_COSINE, ES_MICRO_GGX, ES_MICRO_PHONG, ES_MICRO_MAPPINGS } es_micro_mapping;
+
+static inline es_micro_mapping es_micro_mapping_of(const es_gather_point* point, const es_micro_settings* settings)
+{
+    return point->kind == ES_GATHER_DIFFUSE || !settings->warp ? ES_MICRO_COSINE : point->model == ES_SURFACE_PHONG ? ES_MICRO_PHONG : ES_MICRO_GGX;
+}
+
+/* alpha² or the exponent */
+static inline float es_micro_sharpness(const es_gather_point* point)
+{
+    const float alpha = point->roughness * point->roughness;
+    return point->model == ES_SURFACE_PHONG ? point->roughness : es_maxf(alpha * alpha, ES_SURFACE_MIN_ALPHA2);
+}
+/* As of a view that is at the horizon when it is below. */
+static inline float es_micro_view_cosine(const es_gather_point* point)
+{
+    return es_clampf(point->normal[0] * point->view[0] + point->normal[1] * point->view[1] + point->normal[2] * point->view[2], 1e-3f, 1.0f);
+}
+static inline es_vec3 es_micro_mirror(const es_gather_point* point)
+{
+    const es_vec3 n = es_v3(point->normal[0], point->normal[1], point->normal[2]), v = es_v3(point->view[0], point->view[1], point->view[2]);
+    return es_v3_normalize(es_v3_sub(es_v3_scale(n, 2.0f * es_v3_dot(n, v)), v), n);
+}
+
 /* What all cosine-distributed buffers of a size have in common: the pixels' middles, about z. */
 typedef struct es_micro_table {
     uint32_t size, stride;
     float x[ES_MICRO_PIXELS], y[ES_MICRO_PIXELS], z[ES_MICRO_PIXELS];
     float interface[ES_MICRO_PIXELS];   /* 0.04 + 0.96 (1 - z)^5: what an interface with F90 = 1 does not let through */
+    /* On the disc, of the cells of the grid that a lobe's density is tabulated on: column i, row j at 16 i + j. The middle; at the border, where the density falls to
+     * 0 as a root does, the middles of the quarters. */
+    struct { float x[4], y[4]; uint32_t count; } grid[ES_MICRO_GRID * ES_MICRO_GRID];
 } es_micro_table;
 
 typedef struct es_micro_job {
@@ -30,6 +62,7 @@ typedef struct es_micro_job {
     const uint32_t* order;        /* cells are runs of it */
     float inverse_square;         /* 1/m²: squared distances are compared as shares of the forest's extent */
     float* result[3];
+    es_micro_pixel* picture;      /* of the last point gathered, rows of `size`; NULL: not wanted */
 } es_micro_job;
 
 /* Nodes in world space, one after another. */
@@ -46,10 +79,15 @@ typedef struct es_micro_cut {
 
 /* A worker's. */
 typedef struct es_micro_scratch {
-    int32_t pixels[ES_MICRO_LANES][ES_MICRO_LANE]; /* depth << 16 | place in the cut (kernels/micro.c) */
+    int32_t words[ES_MICRO_LANES][ES_MICRO_LANE]; /* depth << 16 | place in the cut (kernels/micro.c); pixels begin after the margin */
     es_micro_cut cut;
     uint32_t wave[2][2 * ES_MICRO_MAX_CUT]; /* nodes of a tree's level that are looked at */
     uint32_t* trees;                       /* that the cell opens; as many as the forest has */
+    uint8_t cast[ES_MICRO_MAX_CUT];        /* lanes in which a leaf is met by rays */
+    /* of lobes: running sums of the density over columns, and over rows of each column, a lane each; then one lane's rays */
+    float marginal[ES_MICRO_GRID + 1][ES_MICRO_LANES], conditional[ES_MICRO_GRID][ES_MICRO_GRID + 1][ES_MICRO_LANES];
+    float rays[3][ES_MICRO_PIXELS];
+    float chunk_axis[3][ES_MICRO_PIXELS / 8], chunk_cosine[ES_MICRO_PIXELS / 8]; /* cones about eight rays each */
     es_micro_stats stats;
 } es_micro_scratch;
 

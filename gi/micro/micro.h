@@ -34,6 +34,16 @@ typedef struct es_micro_settings {
 
 typedef struct es_micro_stats { uint64_t samples, drawn, cast; } es_micro_stats; /* pixels of micro-buffers; nodes of the cuts times points; leaves met by rays times points */
 
+/* What one pixel of a micro-buffer holds. */
+typedef struct es_micro_pixel {
+    uint32_t node;         /* place in the forest's nodes; UINT32_MAX: nothing is there */
+    float distance;        /* metres, to 1/2048 of itself; 0 where nothing is */
+    float radiance[3];     /* W/(m² sr) */
+} es_micro_pixel;
+
+/* The micro-buffer of one point, settings->size² pixels in rows. */
+es_result es_micro_look(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* point, es_micro_pixel* pixels);
+
 /* result[k][i] of point i. Points are gathered in cells along a space-filling curve, in parallel. Those of a cell share a cut, which is as fine as any of them
  * wants: what a point gets depends a little on its neighbours, but not on threads or instruction sets. stats may be NULL. */
 es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats);
