@@ -22,7 +22,7 @@ bool es_bounce_wants_points(const es_renderer_settings* s) { return bounces_of(s
 
 bool es_bounce_wants_rays(const es_renderer_settings* s)
 {
-    return bounces_of(s) > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_ONE_PASS && s->bounce_rays && (s->method == ES_GI_ISM || s->method == ES_GI_CLASSIC);
+    return bounces_of(s) > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_ONE_PASS && s->bounce_rays && (es_draws_imperfect_maps(s) || s->method == ES_GI_CLASSIC);
 }
 
 uint32_t es_bounce_end(const es_renderer* r, uint32_t bounces)
@@ -47,7 +47,7 @@ static es_result prepare_points(es_renderer* r, const es_frame_inputs* in, const
 
 static es_result draw_maps(es_renderer* r, const es_frame_inputs* in, uint32_t first, uint32_t end)
 {
-    if (r->settings.method == ES_GI_ISM) return es_draw_imperfect_maps(r, in, first, end, es_bounce_room(r));
+    if (es_draws_imperfect_maps(&r->settings)) return es_draw_imperfect_maps(r, in, first, end, es_bounce_room(r));
     return r->settings.method == ES_GI_CLASSIC ? es_draw_classic_maps(r, in, first, end) : ES_OK;
 }
 
@@ -175,38 +175,16 @@ static float on_grid_of(float whole, float a)
     return (float)((((double)a / grid + magic) - magic) * grid);
 }
 
-/* Light that is gathered holds all bounces at once. */
-static es_result gathered_image(es_renderer* r, uint32_t bounce, es_image* image)
-{
-    const uint32_t bounces = r->frame.settings.micro_light == ES_MICRO_LIGHT_DIRECT ? 1 : r->frame.settings.bounces;
-    if (!es_indirect_is_there(r) || bounce > bounces) return ES_OK; /* black */
-    if (bounces > 1) return es_fail(r->context, ES_IMAGE_UNKNOWN, "image indirect-%u: micro-buffers gather all %u bounces at once; with bounces 1 there is indirect-1", bounce, bounces);
-    es_planes sum = {0};
-    es_result result = es_planes_resize(r->context, &sum, &r->gbuffer);
-    if (result) return result;
-    es_compose_job job = es_renderer_compose_job(r);
-    job.lit = r->specular.lit;
-    for (int k = 0; k < 3; k++) {
-        job.irradiance[k] = r->irradiance.at[k];
-        job.specular[k] = r->has_specular ? r->specular.at[k] : NULL;
-        job.indirect[k] = sum.at[k];
-    }
-    es_compose(r->context, &job);
-    for (uint32_t y = 0; y < image->height; y++)
-        for (uint32_t x = 0; x < image->width; x++)
-            for (int k = 0; k < 3; k++) image->pixels[((size_t)y * image->width + x) * 3 + (size_t)k] = sum.at[k][(size_t)y * r->gbuffer.stride + x];
-    es_planes_free(r->context, &sum);
-    return ES_OK;
-}
-
 es_result es_bounce_image(es_renderer* r, uint32_t bounce, es_image* image)
 {
-    if (r->frame.settings.method == ES_GI_MICRO) return gathered_image(r, bounce, image);
-    if (bounce > r->stats.bounce_count) return ES_OK; /* black */
+    const bool gathered = r->frame.settings.method == ES_GI_MICRO;
+    const uint32_t bounces = gathered ? es_micro_bounces(r) : (uint32_t)r->stats.bounce_count;
+    if (bounce > bounces) return ES_OK; /* black */
+    es_result (*first)(es_renderer * r, uint32_t bounces, es_planes * result) = gathered ? es_micro_first_bounces : first_bounces;
     es_planes whole = {0}, sum = {0}, before = {0};
-    es_result result = first_bounces(r, (uint32_t)r->stats.bounce_count, &whole);
-    if (!result) result = first_bounces(r, bounce, &sum);
-    if (!result) result = first_bounces(r, bounce - 1, &before);
+    es_result result = first(r, bounces, &whole);
+    if (!result) result = first(r, bounce, &sum);
+    if (!result) result = first(r, bounce - 1, &before);
     for (uint32_t y = 0; y < image->height && !result; y++)
         for (uint32_t x = 0; x < image->width; x++)
             for (int k = 0; k < 3; k++) {

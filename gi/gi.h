@@ -149,7 +149,7 @@ typedef struct es_renderer_settings {
     bool micro_warp;                 /* a pixel is a direction of the lobe's importance; off: of the cosine's, weighted by the lobe */
     uint32_t micro_nodes;            /* es_micro_nodes */
     uint32_t micro_light;            /* es_micro_light */
-    uint32_t micro_level;            /* RADIOSITY: level of the hierarchy that light is gathered at */
+    uint32_t micro_level;            /* VPLS, RADIOSITY: level of the hierarchy that light is found at, and pushed down from */
     uint32_t micro_iterations;       /* RADIOSITY: times that it is gathered; 0: bounces - 1 */
     uint32_t micro_photons;          /* PHOTONS: sent from all lights */
     float micro_rebuild;             /* how much worse than new a deforming mesh's tree may be before it is built anew */

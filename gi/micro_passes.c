@@ -2,10 +2,12 @@
 
 #include <string.h>
 
+#include "gi/bounce_pass.h"
 #include "gi/indirect.h"
 #include "gi/lit.h"
 #include "gi/micro/light.h"
 #include "gi/micro/pixels.h"
+#include "gi/micro/point_vpls.h"
 #include "gi/micro/upsample.h"
 #include "platform/random.h"
 
@@ -61,7 +63,26 @@ static es_result bring_forest(es_renderer* r, const es_frame_inputs* in)
     return result;
 }
 
-static es_result light_points(es_renderer* r, const es_frame_inputs* in)
+/* With the settings of the frame that is being, or was last, rendered; of virtual point lights the first `vpls`. */
+static es_result light_points(es_renderer* r, uint32_t vpls)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    const float extent = r->frame.extent;
+    if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
+    const es_point_light_job direct = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
+        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes};
+    es_result result = es_points_light_direct(r->context, &r->micro.forest, &direct);
+    es_arena_reset(&r->arena);
+    if (!result && vpls) {
+        const es_shade_job lights = {.vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - vpls, .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance,
+            .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = s->geometry_bound / (extent * extent), .interleave = 1};
+        result = es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &lights, s->micro_level, &r->micro.lobes);
+    }
+    if (!result) es_forest_pull(r->context, &r->micro.forest);
+    return result;
+}
+
+static es_result pass_point_light(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
@@ -71,15 +92,17 @@ static es_result light_points(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
     float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission};
     es_plan_reads(plan, numbers, sizeof numbers);
+    if (r->vpl_count) {
+        es_plan_reads_pass(plan, ES_PASS_VPLS);
+        es_plan_reads_pass(plan, ES_PASS_ISM);
+        es_plan_reads_pass(plan, ES_PASS_BOUNCES);
+        float of_vpls[] = {s->ism_bias, s->ism_slope_bias, s->spread, s->lobe_roughness, s->geometry_bound, in->extent, (float)s->micro_level, (float)r->vpl_count};
+        es_plan_reads(plan, of_vpls, sizeof of_vpls);
+    }
     if (!es_plan_run(plan, ES_PASS_POINT_LIGHT)) return ES_OK;
-    if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
-    const es_point_light_job job = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
-        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes};
-    es_result result = es_points_light_direct(r->context, &r->micro.forest, &job);
-    if (result) return result;
-    es_forest_pull(r->context, &r->micro.forest);
-    es_plan_done(plan, ES_PASS_POINT_LIGHT, r->micro.forest.leaf_count);
-    return ES_OK;
+    es_result result = light_points(r, r->vpl_count);
+    if (!result) es_plan_done(plan, ES_PASS_POINT_LIGHT, r->micro.forest.leaf_count);
+    return result;
 }
 
 es_result es_pass_points(es_renderer* r, const es_frame_inputs* in)
@@ -92,7 +115,7 @@ es_result es_pass_points(es_renderer* r, const es_frame_inputs* in)
         return ES_OK;
     }
     es_result result = bring_forest(r, in);
-    return result ? result : light_points(r, in);
+    return result ? result : pass_point_light(r, in);
 }
 
 /* ---- gathering -------------------------------------------------------------------------------------------------------------------- */
@@ -113,7 +136,7 @@ static bool accumulates(const es_renderer* r) { return r->settings.temporal && r
 
 static es_micro_pixels pixels_of(const es_renderer* r, uint32_t kind)
 {
-    return (es_micro_pixels){.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(turn_of(r)) + r->settings.seed};
+    return (es_micro_pixels){.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(r->micro.turn) + r->frame.settings.seed};
 }
 
 static es_micro_settings settings_of(const es_renderer_settings* s)
@@ -125,7 +148,7 @@ static es_result gather(es_renderer* r, es_micro_pixels* pixels, es_planes* plan
 {
     es_arena_reset(&r->arena);
     for (int k = 0; k < 3; k++) pixels->result[k] = planes->at[k];
-    const es_micro_settings settings = settings_of(&r->settings);
+    const es_micro_settings settings = settings_of(&r->frame.settings);
     return es_micro_gather_pixels(r->context, &r->arena, &r->micro.forest, &settings, pixels, &r->micro.stats, gathered);
 }
 
@@ -201,7 +224,7 @@ static es_result gather_all(es_renderer* r, es_planes* irradiance, es_planes* sp
     es_result result = es_planes_resize(r->context, irradiance, &r->gbuffer);
     if (!result && r->has_specular) result = es_planes_resize(r->context, specular, &r->gbuffer);
     uint64_t gathered = 0;
-    const es_renderer_settings* s = &r->settings;
+    const es_renderer_settings* s = &r->frame.settings;
     if (s->micro_spacing != r->micro.spacing) {
         es_planes_free(r->context, &r->micro.sparse_irradiance);
         es_planes_free(r->context, &r->micro.sparse_specular);
@@ -219,7 +242,7 @@ static es_result gather_all(es_renderer* r, es_planes* irradiance, es_planes* sp
 
 static es_result fill(es_renderer* r, es_planes* irradiance, es_planes* specular, uint64_t* gathered)
 {
-    const es_renderer_settings* s = &r->settings;
+    const es_renderer_settings* s = &r->frame.settings;
     es_result result = interpolate(r, ES_GATHER_DIFFUSE, s->micro_spacing, &r->micro.sparse_irradiance, irradiance, gathered);
     if (!result && r->has_specular) result = interpolate(r, ES_GATHER_LOBE, lobe_spacing(s), &r->micro.sparse_specular, specular, gathered);
     return result;
@@ -237,13 +260,14 @@ es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
     }
     r->has_specular = es_frame_has_lobes(r, in->list);
     const bool several = accumulates(r);
+    r->micro.turn = turn_of(r);
     es_planes *irradiance = several ? &r->micro.fresh_irradiance : &r->irradiance, *specular = several ? &r->micro.fresh_specular : &r->specular;
 
     es_plan_begin(plan, ES_PASS_MICRO);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_POINT_LIGHT);
     es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
-    const uint32_t words[] = {s->micro_size, s->micro_spacing, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->has_specular, s->seed, turn_of(r), several};
+    const uint32_t words[] = {s->micro_size, s->micro_spacing, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->has_specular, s->seed, r->micro.turn, several};
     es_plan_reads(plan, words, sizeof words);
     es_plan_reads(plan, &s->micro_cut, sizeof s->micro_cut);
     bool gathered_now = es_plan_run(plan, ES_PASS_MICRO);
@@ -267,4 +291,41 @@ es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
         if (r->has_specular) accumulate(r, specular, &r->specular, true);
     }
     return ES_OK;
+}
+
+/* ---- images of single bounces --------------------------------------------------------------------------------------------------- */
+
+uint32_t es_micro_bounces(const es_renderer* r)
+{
+    return es_indirect_is_there(r) ? 1 + (uint32_t)(r->vpl_count ? r->stats.bounce_count : 0) : 0;
+}
+
+es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* indirect)
+{
+    es_result result = es_planes_resize(r->context, indirect, &r->gbuffer);
+    if (result || !bounces) return result;
+    es_compose_job job = es_renderer_compose_job(r);
+    es_indirect_planes light;
+    memset(&light, 0, sizeof light);
+    const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
+    if (bounces < es_micro_bounces(r)) {
+        result = light_points(r, es_bounce_end(r, bounces - 1));
+        if (!result) result = gather_all(r, &light.irradiance, &light.specular);
+        uint64_t afresh = 0;
+        if (!result && r->frame.settings.micro_spacing > 1) result = fill(r, &light.irradiance, &light.specular, &afresh);
+        const es_result restored = light_points(r, r->vpl_count);
+        if (restored) es_plan_invalidate(&r->plan);
+        if (!result) result = restored;
+        irradiance = &light.irradiance;
+        specular = &light.specular;
+    }
+    job.lit = specular->lit;
+    for (int k = 0; k < 3; k++) {
+        job.irradiance[k] = irradiance->at[k];
+        job.specular[k] = r->has_specular ? specular->at[k] : NULL;
+        job.indirect[k] = indirect->at[k];
+    }
+    if (!result) es_compose(r->context, &job);
+    es_indirect_planes_free(r->context, &light);
+    return result;
 }

@@ -18,6 +18,10 @@ uint32_t es_micro_vpl_bounces(const es_renderer_settings* settings);
 es_result es_pass_points(es_renderer* renderer, const es_frame_inputs* in);
 /* Gathering and interpolation. */
 es_result es_pass_micro(es_renderer* renderer, const es_frame_inputs* in);
+/* Of the last frame: how many bounces its light has, and the reflected light of the first so many, without that of frames before; the points are lit again
+ * for it. With emission, what glows is seen by the first. */
+uint32_t es_micro_bounces(const es_renderer* renderer);
+es_result es_micro_first_bounces(es_renderer* renderer, uint32_t bounces, es_planes* indirect);
 void es_micro_free_planes(es_context* context, es_micro_buffers* micro);
 void es_micro_free(es_context* context, es_micro_buffers* micro);
 

@@ -314,6 +314,8 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_w
     return result;
 }
 
+bool es_draws_imperfect_maps(const es_renderer_settings* s) { return s->method == ES_GI_ISM || es_micro_vpl_bounces(s); }
+
 float es_near_distance(const es_frame_inputs* in) { return in->extent * 2e-3f; }
 
 es_result es_draw_classic_maps(es_renderer* r, const es_frame_inputs* in, uint32_t first, uint32_t end)
@@ -350,9 +352,9 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const char* none = in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
-    const bool points = !none && (s->method == ES_GI_ISM || es_bounce_wants_points(s));
+    const bool imperfect = es_draws_imperfect_maps(s), points = !none && (imperfect || es_bounce_wants_points(s));
     if (!points) es_plan_not_needed(plan, ES_PASS_POINTS, none ? none : "gi is not ism");
-    if (none || s->method != ES_GI_ISM) es_plan_not_needed(plan, ES_PASS_ISM, none ? none : "gi is not ism");
+    if (none || !imperfect) es_plan_not_needed(plan, ES_PASS_ISM, none ? none : "gi is not ism");
     if (none || s->method != ES_GI_CLASSIC) es_plan_not_needed(plan, ES_PASS_CLASSIC, none ? none : "gi is not classic");
 
     uint32_t subsets = subset_count(s);
@@ -366,11 +368,10 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
         if (result) return result;
         es_plan_done(plan, ES_PASS_POINTS, moved);
     }
-    if (none || (s->method != ES_GI_ISM && s->method != ES_GI_CLASSIC)) return ES_OK;
+    if (none || (!imperfect && s->method != ES_GI_CLASSIC)) return ES_OK;
 
     /* room for all bounces: maps of later ones are added while these stand */
     const uint32_t capacity = es_bounce_room(r);
-    const bool imperfect = s->method == ES_GI_ISM;
     const es_pass pass = imperfect ? ES_PASS_ISM : ES_PASS_CLASSIC;
     es_plan_begin(plan, pass);
     es_plan_reads_pass(plan, ES_PASS_VPLS);

@@ -30,6 +30,7 @@ typedef struct es_micro_buffers {
     es_planes sparse_irradiance, sparse_specular;
     es_planes fresh_irradiance, fresh_specular;   /* of this frame alone, where the renderer's are means over several */
     es_micro_stats stats;      /* of this frame */
+    uint32_t turn;             /* of its buffers */
 } es_micro_buffers;
 
 struct es_renderer {

@@ -61,7 +61,7 @@ static const es_setting renderer_table[] = {
     {"micro.nodes", ES_SETTING_CHOICE, "quantised", 0, 0, "quantised|float", "nodes of the point hierarchy: of 128 bits, or of floats", AT(micro_nodes)},
     {"micro.light", ES_SETTING_CHOICE, "vpls", 0, 0, "direct|vpls|radiosity|photons", "what lights the points with more than one bounce: the lights alone, and virtual point lights, and themselves, or photons",
         AT(micro_light)},
-    {"micro.level", ES_SETTING_INT, "12", 0, 23, NULL, "micro.light radiosity: level of the hierarchy that light is gathered at", AT(micro_level)},
+    {"micro.level", ES_SETTING_INT, "12", 0, 23, NULL, "micro.light vpls and radiosity: light is found at about 2^level points, the others have it from these", AT(micro_level)},
     {"micro.iterations", ES_SETTING_INT, "0", 0, 64, NULL, "micro.light radiosity: times that it is gathered; 0: bounces - 1", AT(micro_iterations)},
     {"micro.photons", ES_SETTING_INT, "262144", 1, 16777216, NULL, "micro.light photons: sent from all lights", AT(micro_photons)},
     {"micro.rebuild", ES_SETTING_FLOAT, "1.5", 1, 1000, NULL, "how much worse than new a deforming mesh's tree of points may be before it is built anew", AT(micro_rebuild)},
