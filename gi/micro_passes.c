@@ -6,8 +6,10 @@
 #include "gi/indirect.h"
 #include "gi/lit.h"
 #include "gi/micro/light.h"
+#include "gi/micro/photon_map.h"
 #include "gi/micro/pixels.h"
 #include "gi/micro/point_vpls.h"
+#include "gi/micro/radiosity.h"
 #include "gi/micro/upsample.h"
 #include "platform/random.h"
 
@@ -30,6 +32,8 @@ const char* es_micro_nothing(const es_frame_inputs* in, const es_renderer_settin
     return !s->micro_emission ? "no light is on" : something_glows(in->list) ? NULL : "no light is on and nothing glows";
 }
 
+bool es_micro_wants_photons(const es_renderer_settings* s) { return s->method == ES_GI_MICRO && s->micro_light == ES_MICRO_LIGHT_PHOTONS && s->bounces > 1; }
+
 uint32_t es_micro_vpl_bounces(const es_renderer_settings* s) { return s->method == ES_GI_MICRO && s->micro_light == ES_MICRO_LIGHT_VPLS && s->bounces > 1 ? s->bounces - 1 : 0; }
 
 void es_micro_free_planes(es_context* context, es_micro_buffers* micro)
@@ -48,6 +52,11 @@ void es_micro_free(es_context* context, es_micro_buffers* micro)
 
 /* ---- points ------------------------------------------------------------------------------------------------------------------ */
 
+static es_micro_settings settings_of(const es_renderer_settings* s)
+{
+    return (es_micro_settings){.size = s->micro_size, .cut = s->micro_cut, .ray_cast = s->micro_ray_cast, .warp = s->micro_warp, .quantised = s->micro_nodes == ES_MICRO_QUANTISED};
+}
+
 static es_result bring_forest(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
@@ -63,20 +72,44 @@ static es_result bring_forest(es_renderer* r, const es_frame_inputs* in)
     return result;
 }
 
-/* With the settings of the frame that is being, or was last, rendered; of virtual point lights the first `vpls`. */
-static es_result light_points(es_renderer* r, uint32_t vpls)
+/* That a picture of the points shows, if they are there; the lights are placed. */
+static uint32_t bounces_of(const es_renderer* r)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    switch ((es_micro_light)s->micro_light) {
+    case ES_MICRO_LIGHT_VPLS: return 1 + (r->vpl_count ? (uint32_t)r->stats.bounce_count : 0);
+    case ES_MICRO_LIGHT_RADIOSITY: return 1 + (s->micro_iterations ? s->micro_iterations : s->bounces - 1);
+    case ES_MICRO_LIGHT_PHOTONS: return s->bounces;
+    default: return 1;
+    }
+}
+
+/* By virtual point lights that stand where light has met up to `bounces` surfaces. */
+static es_result add_vpls(es_renderer* r, uint32_t bounces)
 {
     const es_renderer_settings* s = &r->frame.settings;
     const float extent = r->frame.extent;
+    const es_shade_job lights = {.vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - es_bounce_end(r, bounces), .maps = r->maps.texels, .map_size = r->maps.size,
+        .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness,
+        .geometry_bound = s->geometry_bound / (extent * extent), .interleave = 1};
+    return es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &lights, s->micro_level, &r->micro.lobes);
+}
+
+/* What the points send once light has met up to `bounces` surfaces, theirs the last, with the settings of the frame that is being, or was last, rendered. */
+static es_result light_points(es_renderer* r, uint32_t bounces)
+{
+    const es_renderer_settings* s = &r->frame.settings;
     if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
     const es_point_light_job direct = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
         .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes};
     es_result result = es_points_light_direct(r->context, &r->micro.forest, &direct);
     es_arena_reset(&r->arena);
-    if (!result && vpls) {
-        const es_shade_job lights = {.vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - vpls, .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance,
-            .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness, .geometry_bound = s->geometry_bound / (extent * extent), .interleave = 1};
-        result = es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &lights, s->micro_level, &r->micro.lobes);
+    if (!result && bounces > 1) {
+        const es_radiosity_job radiosity = {.level = s->micro_level, .iterations = bounces - 1, .micro = settings_of(s), .seed = s->seed, .lobes = &r->micro.lobes};
+        const es_photon_job photons = {.scene = &r->trace_scene, .photons = s->micro_photons, .bounces = bounces - 1, .seed = s->seed, .emission = s->micro_emission, .lobes = &r->micro.lobes};
+        if (s->micro_light == ES_MICRO_LIGHT_VPLS) result = add_vpls(r, bounces - 1);
+        if (s->micro_light == ES_MICRO_LIGHT_RADIOSITY) result = es_points_light_radiosity(r->context, &r->arena, &r->micro.forest, &radiosity, NULL);
+        if (s->micro_light == ES_MICRO_LIGHT_PHOTONS) result = es_points_light_photons(r->context, &r->arena, &r->micro.forest, &photons, NULL);
     }
     if (!result) es_forest_pull(r->context, &r->micro.forest);
     return result;
@@ -92,15 +125,17 @@ static es_result pass_point_light(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
     float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission};
     es_plan_reads(plan, numbers, sizeof numbers);
-    if (r->vpl_count) {
-        es_plan_reads_pass(plan, ES_PASS_VPLS);
-        es_plan_reads_pass(plan, ES_PASS_ISM);
-        es_plan_reads_pass(plan, ES_PASS_BOUNCES);
-        float of_vpls[] = {s->ism_bias, s->ism_slope_bias, s->spread, s->lobe_roughness, s->geometry_bound, in->extent, (float)s->micro_level, (float)r->vpl_count};
-        es_plan_reads(plan, of_vpls, sizeof of_vpls);
+    const uint32_t bounces = bounces_of(r);
+    if (bounces > 1) {
+        const es_pass read[] = {ES_PASS_VPLS, ES_PASS_ISM, ES_PASS_BOUNCES, ES_PASS_HIERARCHY};
+        for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
+        uint32_t words[] = {bounces, s->micro_light, s->micro_level, s->micro_photons, s->seed, s->micro_size, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->vpl_count};
+        es_plan_reads(plan, words, sizeof words);
+        float of_light[] = {s->ism_bias, s->ism_slope_bias, s->spread, s->lobe_roughness, s->geometry_bound, in->extent, s->micro_cut};
+        es_plan_reads(plan, of_light, sizeof of_light);
     }
     if (!es_plan_run(plan, ES_PASS_POINT_LIGHT)) return ES_OK;
-    es_result result = light_points(r, r->vpl_count);
+    es_result result = light_points(r, bounces);
     if (!result) es_plan_done(plan, ES_PASS_POINT_LIGHT, r->micro.forest.leaf_count);
     return result;
 }
@@ -137,11 +172,6 @@ static bool accumulates(const es_renderer* r) { return r->settings.temporal && r
 static es_micro_pixels pixels_of(const es_renderer* r, uint32_t kind)
 {
     return (es_micro_pixels){.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(r->micro.turn) + r->frame.settings.seed};
-}
-
-static es_micro_settings settings_of(const es_renderer_settings* s)
-{
-    return (es_micro_settings){.size = s->micro_size, .cut = s->micro_cut, .ray_cast = s->micro_ray_cast, .warp = s->micro_warp, .quantised = s->micro_nodes == ES_MICRO_QUANTISED};
 }
 
 static es_result gather(es_renderer* r, es_micro_pixels* pixels, es_planes* planes, uint64_t* gathered)
@@ -297,7 +327,7 @@ es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
 
 uint32_t es_micro_bounces(const es_renderer* r)
 {
-    return es_indirect_is_there(r) ? 1 + (uint32_t)(r->vpl_count ? r->stats.bounce_count : 0) : 0;
+    return es_indirect_is_there(r) ? bounces_of(r) : 0;
 }
 
 es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* indirect)
@@ -309,11 +339,11 @@ es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* in
     memset(&light, 0, sizeof light);
     const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
     if (bounces < es_micro_bounces(r)) {
-        result = light_points(r, es_bounce_end(r, bounces - 1));
+        result = light_points(r, bounces);
         if (!result) result = gather_all(r, &light.irradiance, &light.specular);
         uint64_t afresh = 0;
         if (!result && r->frame.settings.micro_spacing > 1) result = fill(r, &light.irradiance, &light.specular, &afresh);
-        const es_result restored = light_points(r, r->vpl_count);
+        const es_result restored = light_points(r, bounces_of(r));
         if (restored) es_plan_invalidate(&r->plan);
         if (!result) result = restored;
         irradiance = &light.irradiance;

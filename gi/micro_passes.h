@@ -14,6 +14,9 @@ const char* es_micro_nothing(const es_frame_inputs* in, const es_renderer_settin
 /* Of the virtual point lights that light the points, if they do: how many bounces they make. 0: there are none. */
 uint32_t es_micro_vpl_bounces(const es_renderer_settings* settings);
 
+/* Are points lit by photons, which are traced through the ray hierarchy? */
+bool es_micro_wants_photons(const es_renderer_settings* settings);
+
 /* After the shadow maps. Hierarchy, then light. */
 es_result es_pass_points(es_renderer* renderer, const es_frame_inputs* in);
 /* Gathering and interpolation. */

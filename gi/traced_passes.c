@@ -1,6 +1,7 @@
 /* Passes of methods that trace rays: the hierarchy they go through, and what the bias of virtual point lights leaves out. */
 #include "gi/bias_compensation.h"
 #include "gi/bounce_pass.h"
+#include "gi/micro_passes.h"
 #include "gi/renderer.h"
 #include "gi/vpl_visibility.h"
 
@@ -8,9 +9,10 @@
 es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world* world)
 {
     es_plan* plan = &r->plan;
-    const bool wanted = r->settings.method == ES_GI_MICRO ? es_bounce_wants_rays(&r->settings) : es_bounce_wants_rays(&r->settings) || r->settings.method == ES_GI_VPL_TRACED || r->settings.method == ES_GI_VPL_SAMPLED || r->settings.traced_bias == ES_TRACED_COMPENSATED ||
-        (r->settings.near_distance > 0.0f && r->settings.traced_bias == ES_TRACED_BOUNDED);
-    const char* why = !wanted ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
+    const es_renderer_settings* s = &r->settings;
+    const bool photons = es_micro_wants_photons(s), lights = s->method != ES_GI_MICRO && (s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED || s->traced_bias == ES_TRACED_COMPENSATED ||
+        (s->near_distance > 0.0f && s->traced_bias == ES_TRACED_BOUNDED));
+    const char* why = photons ? in->no_indirect : !lights && !es_bounce_wants_rays(s) ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_HIERARCHY, why);
         es_trace_scene_free(&r->trace_scene);
@@ -20,8 +22,10 @@ es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world*
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
     es_plan_reads(plan, &in->revisions.lights, sizeof in->revisions.lights);
+    const bool emission = photons && s->micro_emission;
+    es_plan_reads(plan, &emission, sizeof emission);
     if (!es_plan_run(plan, ES_PASS_HIERARCHY)) return ES_OK;
-    es_result result = es_trace_scene_take(&r->trace_scene, world, false);
+    es_result result = es_trace_scene_take(&r->trace_scene, world, emission);
     if (result) es_trace_scene_free(&r->trace_scene);
     else es_plan_done(plan, ES_PASS_HIERARCHY, es_bvh_primitive_count(r->trace_scene.bvh));
     return result;

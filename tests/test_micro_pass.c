@@ -239,7 +239,7 @@ static void test_interpolation(void** state)
                 for (uint32_t k = 0; k < 3; k++) {
                     const size_t i = ((size_t)y * WIDTH + x) * 3 + k;
                     const double a = (double)sparse.pixels[i], b = (double)full.pixels[i], d = a - b;
-                    if (b > 0.0 && !(a > 0.0)) fail_msg("spacing %u: pixel (%u, %u) is dark", spacing, x, y);
+                    if (b > 1e-3 && !(a > 0.0)) fail_msg("spacing %u: pixel (%u, %u) is dark, not %g", spacing, x, y, b);
                     lit += k == 0 && b > 0.0;
                     squares += d * d;
                     sum += b;
@@ -286,16 +286,20 @@ static void test_settles(void** state)
     es_image settled = image_of(&s, "irradiance");
     assert_true(hash_of(&s, "irradiance") == hash_of(&moved, "irradiance") && hash_of(&s, "display") == hash_of(&moved, "display"));
 
-    s.settings.temporal = false;
-    s.settings.micro_size = 32;
+    /* of other random numbers: where there is no noise there is no difference */
+    s.settings.seed = moved.settings.seed = 77;
     configure(&s);
     render(&s);
-    es_image fine = image_of(&s, "irradiance");
-    const double alone = difference(&single, &fine), mean = difference(&settled, &fine);
-    if (!(mean < 0.7 * alone)) fail_msg("a frame is %.4f from one of 16 times the samples, the settled one %.4f", alone, mean);
+    es_image other = image_of(&s, "irradiance");
+    configure(&moved);
+    for (uint32_t i = 0; i < settings.temporal_settle + 2; i++) render(&moved);
+    es_image other_settled = image_of(&moved, "irradiance");
+    const double alone = difference(&single, &other), mean = difference(&settled, &other_settled);
+    if (!(alone > 0.01 && mean < 0.35 * alone)) fail_msg("frames of two seeds differ by %.4f, settled ones by %.4f", alone, mean); /* 1/4, were they independent */
     es_image_destroy(s.context, &single);
     es_image_destroy(s.context, &settled);
-    es_image_destroy(s.context, &fine);
+    es_image_destroy(s.context, &other);
+    es_image_destroy(moved.context, &other_settled);
     close_stage(&s);
     close_stage(&moved);
 }
