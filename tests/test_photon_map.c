@@ -9,7 +9,10 @@
 
 #include <cmocka.h>
 
+#include "gi/micro/leaf_grid.h"
 #include "gi/micro/photon_map.h"
+#include "platform/random.h"
+#include "raster/pack.h"
 #include "tests/small_worlds.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -181,6 +184,51 @@ static void test_glow(void** state)
     leave(&r);
 }
 
+/* The nearest of all leaves that face as they should, on surfaces that bend by more than that from one triangle to the next. */
+static void test_nearest_leaf(void** state)
+{
+    (void)state;
+    room r = {.w = small_world_create()};
+    const es_material_desc m = lambert(0.5f, 0);
+    add_sphere(&r.w, es_v3(0, 0, 0), 1, 8, true, &m);
+    /* a tetrahedron: past an edge normals differ by more than 60° */
+    static const float corners[12] = {0.5f, 0.5f, 0.5f, 0.5f, -0.5f, -0.5f, -0.5f, 0.5f, -0.5f, -0.5f, -0.5f, 0.5f};
+    static const uint32_t indices[12] = {0, 1, 2, 0, 3, 1, 0, 2, 3, 1, 3, 2};
+    add_instance(&r.w, &(es_mesh_desc){.vertex_count = 4, .triangle_count = 4, .positions = corners, .indices = indices, .flat_normals = true}, &m);
+    bring(&r, false);
+    es_leaf_grid grid;
+    assert_int_equal(es_leaf_grid_make(&r.arena, &r.forest, &grid), ES_OK);
+    uint32_t others = 0;
+    for (uint32_t i = 0; i < 400; i++) {
+        const uint32_t tree = i % r.forest.tree_count;
+        const es_point_tree* t = &r.forest.trees[tree];
+        const size_t at = t->first_leaf + es_random_u32(5, 4 * i) % t->leaf_count;
+        const float step = es_sqrt(r.forest.area[t->first + 1] / (float)t->leaf_count);
+        es_vec3 p = es_v3(r.forest.x[at], r.forest.y[at], r.forest.z[at]);
+        for (int k = 0; k < 3; k++) (&p.x)[k] += step * (es_random_float(5, 4 * i + 1 + (uint32_t)k) - 0.5f);
+        const es_vec3 n = es_unpack_normal(r.forest.normal[at]);
+        size_t best = 0, any = 0;
+        float least = 3e38f, least_of_any = 3e38f;
+        for (size_t leaf = t->first_leaf; leaf < t->first_leaf + t->leaf_count; leaf++) {
+            const float dx = r.forest.x[leaf] - p.x, dy = r.forest.y[leaf] - p.y, dz = r.forest.z[leaf] - p.z, d2 = dx * dx + dy * dy + dz * dz;
+            if (d2 < least_of_any) {
+                least_of_any = d2;
+                any = leaf;
+            }
+            if (!(d2 < least) || !(es_v3_dot(n, es_unpack_normal(r.forest.normal[leaf])) > 0.5f)) continue;
+            least = d2;
+            best = leaf;
+        }
+        assert_int_equal(es_leaf_grid_nearest(&grid, tree, p, n), best);
+        others += best != any;
+    }
+    assert_true(r.forest.tree_count == 2 && others > 0);
+    /* far from everything: some leaf of the tree */
+    const size_t leaf = es_leaf_grid_nearest(&grid, 1, es_v3(1e6f, -1e6f, 0), es_v3(0, 1, 0));
+    assert_true(leaf >= r.forest.trees[1].first_leaf && leaf < r.forest.leaf_count);
+    leave(&r);
+}
+
 static void test_same_bits(void** state)
 {
     (void)state;
@@ -274,6 +322,7 @@ int main(int argc, char** argv)
         cmocka_unit_test(test_sphere),
         cmocka_unit_test(test_box),
         cmocka_unit_test(test_glow),
+        cmocka_unit_test(test_nearest_leaf),
         cmocka_unit_test(test_same_bits),
         cmocka_unit_test(test_little),
     };

@@ -16,21 +16,25 @@ typedef struct leaf_stretch {
 } leaf_stretch;
 
 /* Lanes past the end are copies of the first leaf. */
+static void take_words(void* to, const void* from, uint32_t count)
+{
+    uint32_t* words = to;
+    memcpy(words, from, count * sizeof *words);
+    for (uint32_t i = count; i % VW; i++) words[i] = words[0];
+}
+
 static void take_leaves(const es_point_forest* f, size_t leaf, uint32_t count, leaf_stretch* s)
 {
     s->count = count;
     s->vectors = (count + VW - 1) / VW;
     int32_t normals[STRETCH];
-    for (uint32_t i = 0; i < s->vectors * VW; i++) {
-        const size_t from = leaf + (i < count ? i : 0);
-        s->p[0][i] = f->x[from];
-        s->p[1][i] = f->y[from];
-        s->p[2][i] = f->z[from];
-        normals[i] = (int32_t)f->normal[from];
-        s->rg[i] = (int32_t)f->albedo_rg[from];
-        s->b[i] = (int32_t)f->albedo_b[from];
-        s->word[i] = (int32_t)f->surface[from];
-    }
+    take_words(s->p[0], f->x + leaf, count);
+    take_words(s->p[1], f->y + leaf, count);
+    take_words(s->p[2], f->z + leaf, count);
+    take_words(normals, f->normal + leaf, count);
+    take_words(s->rg, f->albedo_rg + leaf, count);
+    take_words(s->b, f->albedo_b + leaf, count);
+    take_words(s->word, f->surface + leaf, count);
     for (uint32_t i = 0; i < s->vectors * VW; i += VW) {
         vf nx, ny, nz;
         es_unpack_normal_v(vi_load(normals + i), &nx, &ny, &nz);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/micro/leaf_grid.h"
 #include "gi/reference/light_choice.h"
 #include "gi/reference/light_vertices.h"
 #include "gi/reference/path.h"
@@ -163,85 +164,6 @@ static void trace_chunk(void* user, uint32_t begin, uint32_t end, uint32_t worke
 
 /* ---- from photons to leaves ------------------------------------------------------------------------------------------------------------ */
 
-/* Leaves by the cells of a grid of their tree's own, hashed: cell c's are order[start[h(c)] … start[h(c) + 1]), with others'. Cells are two leaves wide. */
-typedef struct leaf_grid {
-    const es_point_forest* forest;
-    float* scale;                 /* cells a metre, of each tree */
-    uint32_t *start, *order, mask;
-} leaf_grid;
-
-static uint32_t cell_hash(const leaf_grid* g, uint32_t tree, const int32_t cell[3])
-{
-    return es_hash_u32((uint32_t)cell[0] * 0x8da6b343u ^ (uint32_t)cell[1] * 0xd8163841u ^ (uint32_t)cell[2] * 0xcb1ab31fu ^ tree * 0x9e3779b9u) & g->mask;
-}
-
-static int32_t cell_of(float x, float scale) { return (int32_t)es_clampf(es_floor(x * scale), -1e9f, 1e9f); }
-
-static uint32_t leaf_hash(const leaf_grid* g, uint32_t tree, size_t leaf)
-{
-    const es_point_forest* f = g->forest;
-    const int32_t cell[3] = {cell_of(f->x[leaf], g->scale[tree]), cell_of(f->y[leaf], g->scale[tree]), cell_of(f->z[leaf], g->scale[tree])};
-    return cell_hash(g, tree, cell);
-}
-
-static es_result make_grid(es_arena* arena, const es_point_forest* f, leaf_grid* g)
-{
-    uint32_t buckets = 1024;
-    while (buckets < f->leaf_count / 2 && buckets < 1u << 30) buckets *= 2;
-    *g = (leaf_grid){.forest = f, .mask = buckets - 1};
-    g->scale = es_arena_allocate(arena, ((size_t)f->tree_count + 1) * sizeof *g->scale);
-    g->start = g->scale ? es_arena_allocate(arena, ((size_t)buckets + 2) * sizeof *g->start) : NULL;
-    g->order = g->start ? es_arena_allocate(arena, (f->leaf_count + 1) * sizeof *g->order) : NULL;
-    if (!g->order) return es_context_last_result(arena->context);
-    memset(g->start, 0, ((size_t)buckets + 2) * sizeof *g->start);
-    for (uint32_t t = 0; t < f->tree_count; t++) {
-        const es_point_tree* tree = &f->trees[t];
-        g->scale[t] = 0.5f / es_sqrt(es_clampf(f->area[tree->first + 1] / (float)tree->leaf_count, 1e-30f, 1e30f));
-        for (size_t i = tree->first_leaf; i < tree->first_leaf + tree->leaf_count; i++) g->start[leaf_hash(g, t, i) + 2]++;
-    }
-    for (uint32_t b = 0; b < buckets; b++) g->start[b + 2] += g->start[b + 1];
-    for (uint32_t t = 0; t < f->tree_count; t++)
-        for (size_t i = f->trees[t].first_leaf; i < f->trees[t].first_leaf + f->trees[t].leaf_count; i++) g->order[g->start[leaf_hash(g, t, i) + 1]++] = (uint32_t)i;
-    return ES_OK;
-}
-
-/* The nearest leaf of the tree, of those whose normal is within 60° of the photon's where there are such, around its cell; the first one that is
- * found in wider and wider surroundings otherwise, and any where none is near. */
-static size_t nearest_leaf(const leaf_grid* g, const photon* p)
-{
-    const es_point_forest* f = g->forest;
-    const es_point_tree* tree = &f->trees[p->tree];
-    const es_vec3 n = es_unpack_normal(p->normal);
-    int32_t cell[3];
-    for (int k = 0; k < 3; k++) cell[k] = cell_of(p->position[k], g->scale[p->tree]);
-    size_t best = tree->first_leaf;
-    float least = 3e38f;
-    for (int32_t reach = 1; reach <= 4 && least > 1e38f; reach++) {
-        float far = 3e38f;
-        for (int32_t z = -reach; z <= reach; z++)
-            for (int32_t y = -reach; y <= reach; y++)
-                for (int32_t x = -reach; x <= reach; x++) {
-                    const int32_t at[3] = {cell[0] + x, cell[1] + y, cell[2] + z};
-                    const uint32_t h = cell_hash(g, p->tree, at);
-                    for (uint32_t i = g->start[h]; i < g->start[h + 1]; i++) {
-                        const size_t leaf = g->order[i];
-                        if (leaf < tree->first_leaf || leaf >= tree->first_leaf + tree->leaf_count) continue;
-                        const float dx = f->x[leaf] - p->position[0], dy = f->y[leaf] - p->position[1], dz = f->z[leaf] - p->position[2], d2 = dx * dx + dy * dy + dz * dz;
-                        if (!(d2 < (least < 1e38f ? least : far))) continue;
-                        if (es_v3_dot(n, es_unpack_normal(f->normal[leaf])) > 0.5f) {
-                            least = d2;
-                            best = leaf;
-                        } else if (!(least < 1e38f)) {
-                            far = d2;
-                            best = leaf;
-                        }
-                    }
-                }
-        if (far < 1e38f) break;
-    }
-    return best;
-}
-
 typedef struct owner_loop { const es_point_forest* forest; const es_point_level* level; uint32_t* owner; } owner_loop;
 
 static void find_owners(void* user, const es_leaf_range* range, uint32_t worker)
@@ -251,21 +173,26 @@ static void find_owners(void* user, const es_leaf_range* range, uint32_t worker)
     for (uint32_t i = 0; i < range->count; i++) loop->owner[range->leaf + i] = es_point_level_owner(loop->level, loop->forest, range->tree, range->leaf + i);
 }
 
-typedef struct landing_loop { const leaf_grid* grid; const photon* photons; const uint32_t* owner; uint32_t* samples; uint32_t places; } landing_loop;
+typedef struct landing_loop { const es_leaf_grid* grid; const photon* photons; const uint32_t* owner; uint32_t* samples; uint32_t places; } landing_loop;
+
+static size_t landed_on(const es_leaf_grid* grid, const photon* p)
+{
+    return es_leaf_grid_nearest(grid, p->tree, es_v3(p->position[0], p->position[1], p->position[2]), es_unpack_normal(p->normal));
+}
 
 static void find_samples(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const landing_loop* loop = user;
     (void)worker;
     for (size_t i = (size_t)begin * loop->places; i < (size_t)end * loop->places; i++)
-        if (loop->photons[i].tree != NO_TREE) loop->samples[i] = loop->owner[nearest_leaf(loop->grid, &loop->photons[i])];
+        if (loop->photons[i].tree != NO_TREE) loop->samples[i] = loop->owner[landed_on(loop->grid, &loop->photons[i])];
 }
 
 /* Power and area of each sample of the level, both by the same nearest leaf. */
 static es_result gather_power(es_context* context, es_arena* arena, const es_point_forest* f, const es_point_level* level, const photon* photons, uint32_t paths, uint32_t places, float* power[3], float* areas)
 {
-    leaf_grid grid;
-    es_result result = make_grid(arena, f, &grid);
+    es_leaf_grid grid;
+    es_result result = es_leaf_grid_make(arena, f, &grid);
     uint32_t* owner = result ? NULL : es_arena_allocate(arena, (f->leaf_count + 1) * sizeof *owner);
     uint32_t* samples = owner ? es_arena_allocate(arena, ((size_t)paths * places + 1) * sizeof *samples) : NULL;
     if (!samples) return result ? result : es_context_last_result(context);
