@@ -146,9 +146,9 @@ static es_result gather(es_context* context, const es_point_forest* forest, cons
     const uint32_t workers = es_context_workers(context);
     const size_t trees_all = (size_t)workers * forest->tree_count;
     es_micro_table* table = es_allocate(context, sizeof *table);
-    uint32_t* order = es_allocate_array(context, count, sizeof *order);
-    es_micro_scratch* scratch = es_allocate_array(context, workers, sizeof *scratch);
-    uint32_t* trees = es_allocate_array(context, trees_all, sizeof *trees);
+    uint32_t* order = table ? es_allocate_array(context, count, sizeof *order) : NULL; /* each failure is one message */
+    es_micro_scratch* scratch = order ? es_allocate_array(context, workers, sizeof *scratch) : NULL;
+    uint32_t* trees = scratch ? es_allocate_array(context, trees_all, sizeof *trees) : NULL;
     es_result made = table && order && scratch && trees ? ES_OK : es_context_last_result(context);
     gathering g = {.kernels = es_gi_kernel_table(es_context_isa(context)), .scratch = scratch};
     if (!made) made = find_order(context, settings, points, count, order, g.ends);
