@@ -54,14 +54,14 @@
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
     X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))       \
     X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))                   \
-    /* gi/micro/forest_parts.h: leaves, leaves, parents of one level, nodes, parents, nodes, parents */           \
+    /* gi/micro/forest_parts.h */                                                                                \
+    X(forest_box, (const float* positions, const float u[9], uint32_t begin, uint32_t end, float low[3], float high[3])) \
     X(forest_leaves, (const es_leaf_job* job, uint32_t begin, uint32_t end))                                     \
-    X(forest_pose, (const es_pose_job* job, uint32_t begin, uint32_t end))                                       \
-    X(forest_merge, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end, float* sum))                      \
-    X(forest_quantise, (const es_quantise_job* job, uint32_t begin, uint32_t end))                               \
-    X(forest_pull, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                   \
-    X(forest_pack, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                   \
-    X(forest_blend, (const es_tree_nodes* nodes, uint32_t begin, uint32_t end))                                  \
+    X(forest_merge, (const es_node_columns* columns, uint32_t level, const float* child_area, float* area, float* sum)) \
+    X(forest_quantise, (const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, es_point_node* nodes)) \
+    X(forest_pull, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
+    X(forest_pack, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
+    X(forest_blend, (const es_node_looks* looks, uint32_t begin, uint32_t end))                                  \
     /* points order[first … first + count), 1 … ES_MICRO_CELL of them */                                         \
     X(micro_gather, (const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* scratch))
 

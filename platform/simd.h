@@ -340,6 +340,18 @@ VINL void vf_transpose8(vf v[8])
         }
 #endif
 }
+/* Of the sixteen lanes of a and b, in order, those at even and those at odd places. */
+VINL void vf_deinterleave(vf a, vf b, vf* even, vf* odd)
+{
+#if defined(ES_SIMD_256)
+    const __m256 e = _mm256_shuffle_ps((__m256)a, (__m256)b, 0x88), o = _mm256_shuffle_ps((__m256)a, (__m256)b, 0xdd);
+    *even = (vf)_mm256_permute4x64_epi64((__m256i)e, 0xd8);
+    *odd = (vf)_mm256_permute4x64_epi64((__m256i)o, 0xd8);
+#else
+    *even = (vf){a[0], a[2], a[4], a[6], b[0], b[2], b[4], b[6]};
+    *odd = (vf){a[1], a[3], a[5], a[7], b[1], b[3], b[5], b[7]};
+#endif
+}
 VINL void vf_store4(float* p, vf a, vf b, vf c, vf d)
 {
 #if defined(ES_SIMD_256)

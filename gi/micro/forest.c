@@ -143,7 +143,7 @@ static void share_out(share* shares, uint32_t count, uint32_t points)
 
 static size_t padded(size_t count) { return (count + 7) / 8 * 8; }
 
-enum { ARRAYS = 23 };
+enum { ARRAYS = 24 };
 typedef struct array { void** pointer; size_t count, size; } array;
 
 static void list_arrays(es_point_forest* f, array out[ARRAYS])
@@ -153,31 +153,38 @@ static void list_arrays(es_point_forest* f, array out[ARRAYS])
     const array all[ARRAYS] = {
         {(void**)&f->trees, f->tree_count, sizeof *f->trees}, {(void**)&own->states, f->tree_count, sizeof *own->states},
         {(void**)&own->tasks, own->task_count, sizeof *own->tasks}, {(void**)&f->top_trees, f->top.leaf_count, sizeof *f->top_trees},
-        {(void**)&f->nodes, nodes, sizeof *f->nodes}, {(void**)&f->float_nodes, nodes, sizeof *f->float_nodes}, {(void**)&f->radiance[0], nodes, sizeof(float)},
+        {(void**)&f->nodes, nodes, sizeof *f->nodes}, {(void**)&f->float_nodes, own->floats ? nodes : 0, sizeof *f->float_nodes}, {(void**)&f->radiance[0], nodes, sizeof(float)},
         {(void**)&f->radiance[1], nodes, sizeof(float)}, {(void**)&f->radiance[2], nodes, sizeof(float)}, {(void**)&f->area, nodes, sizeof(float)},
         {(void**)&f->albedo, nodes, sizeof(uint32_t)}, {(void**)&f->emission, nodes, sizeof(uint32_t)}, {(void**)&f->x, leaves, sizeof(float)},
         {(void**)&f->y, leaves, sizeof(float)}, {(void**)&f->z, leaves, sizeof(float)}, {(void**)&f->normal, leaves, sizeof(uint32_t)},
         {(void**)&f->albedo_rg, leaves, sizeof(uint32_t)}, {(void**)&f->albedo_b, leaves, sizeof(uint32_t)}, {(void**)&f->surface, leaves, sizeof(uint32_t)},
-        {(void**)&f->triangle, leaves, sizeof(uint32_t)}, {(void**)&f->barycentric, leaves, sizeof(uint32_t)}, {NULL}, {NULL}};
+        {(void**)&f->triangle, leaves, sizeof(uint32_t)}, {(void**)&f->barycentric, leaves, sizeof(uint32_t)}, {(void**)&own->shapes.along, 3 * leaves, sizeof(float)},
+        {(void**)&own->upper.of[0], ES_NODE_COLUMNS * own->upper_count, sizeof(float)}, {(void**)&own->scratch.of[0], ES_NODE_COLUMNS * own->scratch_count, sizeof(float)}};
     memcpy(out, all, sizeof all);
-    out[21] = (array){(void**)&own->shapes.along, 3 * leaves, sizeof(float)};
-    out[22] = (array){NULL};
+}
+
+/* The counts of nothing. */
+static void forget_counts(es_point_forest* forest)
+{
+    struct es_forest_private* own = forest->own;
+    own->shapes = (es_leaf_shapes){0};
+    own->upper = own->scratch = (es_node_columns){{0}};
+    own->task_count = own->upper_count = own->scratch_count = 0;
+    forest->tree_count = 0;
+    forest->node_count = forest->leaf_count = 0;
+    forest->top = (es_point_tree){0};
+    forest->radius = 0.0f;
 }
 
 static void free_arrays(es_context* context, es_point_forest* forest)
 {
     array arrays[ARRAYS];
     list_arrays(forest, arrays);
-    for (int k = 0; k < ARRAYS && arrays[k].pointer; k++) {
+    for (int k = 0; k < ARRAYS; k++) {
         es_release(context, *arrays[k].pointer, arrays[k].count * arrays[k].size);
         *arrays[k].pointer = NULL;
     }
-    struct es_forest_private* own = forest->own;
-    own->shapes = (es_leaf_shapes){0};
-    own->task_count = 0;
-    forest->tree_count = 0;
-    forest->node_count = forest->leaf_count = 0;
-    forest->top = (es_point_tree){0};
+    forget_counts(forest);
 }
 
 /* Of the counts that are set. */
@@ -186,19 +193,17 @@ static es_result allocate_arrays(es_context* context, es_point_forest* forest)
     array arrays[ARRAYS];
     list_arrays(forest, arrays);
     size_t bytes = 0;
-    for (int k = 0; k < ARRAYS && arrays[k].pointer; k++) bytes += arrays[k].count * arrays[k].size;
+    for (int k = 0; k < ARRAYS; k++) bytes += arrays[k].count * arrays[k].size;
     const size_t cap = es_context_resolved_desc(context).memory_cap, used = es_context_bytes(context);
     if (cap && (used > cap || bytes > cap - used)) {
         const size_t left = used < cap ? cap - used : 0;
         es_result result = es_fail(context, ES_MEMORY_CAP, "a hierarchy of %zu points needs %zu MiB, and the memory cap leaves %zu; about %zu points would fit", forest->leaf_count,
             (bytes >> 20) + 1, left >> 20, (size_t)((double)forest->leaf_count * ((double)left / (double)bytes)));
-        forest->tree_count = 0;
-        forest->node_count = forest->leaf_count = 0;
-        forest->top = (es_point_tree){0};
-        forest->own->task_count = 0;
+        forget_counts(forest);
         return result;
     }
-    for (int k = 0; k < ARRAYS && arrays[k].pointer; k++) {
+    for (int k = 0; k < ARRAYS; k++) {
+        if (!arrays[k].count) continue;
         *arrays[k].pointer = es_allocate_zero(context, arrays[k].count * arrays[k].size);
         if (!*arrays[k].pointer) {
             free_arrays(context, forest);
@@ -208,6 +213,11 @@ static es_result allocate_arrays(es_context* context, es_point_forest* forest)
     const size_t leaves = padded(forest->leaf_count);
     forest->own->shapes.across = forest->own->shapes.along + leaves;
     forest->own->shapes.shear = forest->own->shapes.along + 2 * leaves;
+    struct es_forest_private* own = forest->own;
+    for (size_t k = 1; k < ES_NODE_COLUMNS; k++) {
+        own->upper.of[k] = own->upper.of[0] + k * own->upper_count;
+        own->scratch.of[k] = own->scratch.of[0] + k * own->scratch_count;
+    }
     return ES_OK;
 }
 
@@ -226,8 +236,9 @@ void es_forest_free(es_context* context, es_point_forest* forest)
 static uint32_t tasks_of(uint32_t leaves) { return leaves < ES_TREE_BLOCK ? 1 : leaves / ES_TREE_BLOCK; }
 
 /* Is there a tree for each share, in order? */
-static bool same_trees(const es_point_forest* forest, const es_forest_source* sources, const share* shares, const es_draw_list* list)
+static bool same_trees(const es_point_forest* forest, const es_forest_source* sources, const share* shares, const es_draw_list* list, bool floats)
 {
+    if (forest->own->floats != floats) return false;
     uint32_t tree = 0;
     for (uint32_t i = 0; i < 2 * list->instance_count; i++) {
         if (shares[i].leaves == UINT32_MAX) continue;
@@ -250,15 +261,19 @@ static void take_tree(es_point_forest* to, uint32_t new_tree, const es_point_for
     es_point_tree* tree = &to->trees[new_tree];
     const es_point_tree* old = &from->trees[old_tree];
     const size_t first = tree->first, first_leaf = tree->first_leaf, nodes = 2 * (size_t)tree->leaf_count, leaves = tree->leaf_count;
-    const uint32_t instance = tree->instance, source = to->own->states[new_tree].source;
+    const uint32_t instance = tree->instance, source = to->own->states[new_tree].source, blocks = tasks_of(tree->leaf_count);
+    const size_t upper = to->own->states[new_tree].upper, old_upper = from->own->states[old_tree].upper;
     *tree = *old;
     tree->instance = instance;
     tree->first = first;
     tree->first_leaf = first_leaf;
     to->own->states[new_tree] = from->own->states[old_tree];
     to->own->states[new_tree].source = source;
+    to->own->states[new_tree].upper = upper;
+    for (int k = 0; k < ES_NODE_COLUMNS; k++) copy_words(to->own->upper.of[k], upper, from->own->upper.of[k], old_upper, 2 * (size_t)blocks, sizeof(float));
     copy_words(to->nodes, first, from->nodes, old->first, nodes, sizeof *to->nodes);
-    copy_words(to->float_nodes, first, from->float_nodes, old->first, nodes, sizeof *to->float_nodes);
+    if (to->own->floats && from->own->floats) copy_words(to->float_nodes, first, from->float_nodes, old->first, nodes, sizeof *to->float_nodes);
+    else if (to->own->floats) to->own->states[new_tree].revision = UINT64_MAX; /* they have to be made */
     for (int c = 0; c < 3; c++) copy_words(to->radiance[c], first, from->radiance[c], old->first, nodes, sizeof(float));
     copy_words(to->area, first, from->area, old->first, nodes, sizeof(float));
     copy_words(to->albedo, first, from->albedo, old->first, nodes, sizeof(uint32_t));
@@ -271,16 +286,15 @@ static void take_tree(es_point_forest* to, uint32_t new_tree, const es_point_for
 }
 
 /* Other trees than there were. */
-static es_result lay_out(es_context* context, es_point_forest* forest, const es_forest_source* sources, const share* shares, const es_draw_list* list)
+static es_result lay_out(es_context* context, es_point_forest* forest, const es_forest_source* sources, const share* shares, const es_draw_list* list, bool floats)
 {
-    struct es_forest_private own = {0};
+    struct es_forest_private own = {.floats = floats};
     es_point_forest next = {.own = &own};
-    size_t task_count = 0;
     for (uint32_t i = 0; i < 2 * list->instance_count; i++) {
         if (shares[i].leaves == UINT32_MAX) continue;
         next.tree_count++;
         next.leaf_count += (size_t)1 << shares[i].leaves;
-        task_count += tasks_of(1u << shares[i].leaves);
+        own.task_count += tasks_of(1u << shares[i].leaves);
     }
     next.top.leaf_count = next.tree_count ? 1 : 0;
     while (next.top.leaf_count < next.tree_count) next.top.leaf_count *= 2;
@@ -289,9 +303,11 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
     next.top.first_leaf = next.leaf_count;
     next.top.instance = UINT32_MAX;
     next.top.rotation[0] = next.top.rotation[4] = next.top.rotation[8] = 1.0f;
-    own.task_count = task_count;
+    own.upper_count = 2 * (own.task_count + next.top.leaf_count);
+    own.scratch_count = 2 * ES_TREE_BLOCK * (size_t)es_context_workers(context);
     if (!next.tree_count) {
         free_arrays(context, forest);
+        forest->own->floats = floats;
         return ES_OK;
     }
     es_result result = allocate_arrays(context, &next);
@@ -303,7 +319,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
         const uint32_t leaves = 1u << shares[i].leaves, id = sources[i / 2].id;
         const bool back = i % 2 == 1;
         next.trees[tree] = (es_point_tree){.instance = i / 2, .back = back, .leaf_count = leaves, .first = 2 * leaf, .first_leaf = leaf};
-        own.states[tree] = (es_tree_state){.id = id, .source = i / 2};
+        own.states[tree] = (es_tree_state){.id = id, .source = i / 2, .upper = 2 * (size_t)task};
         for (uint32_t turn = 0; turn < forest->tree_count; turn++, old++) {
             if (old >= forest->tree_count) old = 0;
             if (forest->own->states[old].id != id || forest->trees[old].back != back || forest->trees[old].leaf_count != leaves) continue;
@@ -381,17 +397,6 @@ static es_result build(es_context* context, es_point_forest* forest, uint32_t in
     return points ? ES_OK : es_context_last_result(context);
 }
 
-typedef struct standing { const es_point_node_float* leaves; es_split_point* points; } standing;
-
-static void stand_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
-{
-    const standing* s = user;
-    for (uint32_t i = begin; i < end; i++) {
-        memcpy(s->points[i].position, s->leaves[i].position, sizeof s->points[i].position);
-        s->points[i].index = i;
-    }
-}
-
 /* Splits a tree as its leaves stand now; what they have goes with them. */
 static es_result rebuild(es_context* context, es_point_forest* forest, uint32_t index)
 {
@@ -401,8 +406,7 @@ static es_result rebuild(es_context* context, es_point_forest* forest, uint32_t 
     uint32_t* scratch = points ? es_allocate_array(context, count, sizeof *scratch) : NULL;
     if (scratch) {
         const size_t node = tree->first + count, leaf = tree->first_leaf;
-        standing s = {forest->float_nodes + node, points};
-        es_parallel_for(context, count, 4096, stand_some, &s);
+        es_forest_stand(context, forest, index, points);
         es_tree_split(context, points, count);
         const es_leaf_shapes* shapes = &forest->own->shapes;
         void* const arrays[13] = {forest->albedo_rg + leaf, forest->albedo_b + leaf, forest->surface + leaf, forest->triangle + leaf, forest->barycentric + leaf, shapes->along + leaf,
@@ -440,6 +444,27 @@ static void read_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
         f->emission[node] = words.hole ? 0 : es_pack_rgb9e5(es_surfel_emission(instance->mesh, material, f->triangle[leaf], f->barycentric[leaf]));
         float* along = &f->own->shapes.along[leaf];
         *along = words.hole ? -es_maxf(es_absf(*along), 1e-30f) : es_absf(*along);
+    }
+}
+
+static bool all_equal(const uint32_t* words, size_t count)
+{
+    for (size_t i = 1; i < count; i++)
+        if (words[i] != words[0]) return false;
+    return true;
+}
+
+/* Where all leaves look alike, so do all nodes. */
+static void note_plain(es_point_forest* forest, uint32_t index)
+{
+    const es_point_tree* tree = &forest->trees[index];
+    uint32_t *albedo = forest->albedo + tree->first, *emission = forest->emission + tree->first;
+    const uint32_t leaves = tree->leaf_count;
+    forest->own->states[index].plain = all_equal(albedo + leaves, leaves) && all_equal(emission + leaves, leaves);
+    if (!forest->own->states[index].plain) return;
+    for (uint32_t i = 1; i < leaves; i++) {
+        albedo[i] = albedo[leaves];
+        emission[i] = emission[leaves];
     }
 }
 
@@ -491,9 +516,9 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
     }
     share_out(shares, 2 * list->instance_count, request->points);
     bool changed = false;
-    if (!same_trees(forest, sources, shares, list)) {
+    if (!same_trees(forest, sources, shares, list, !request->packed_only)) {
         changed = true;
-        result = lay_out(context, forest, sources, shares, list);
+        result = lay_out(context, forest, sources, shares, list, !request->packed_only);
         if (result) return result;
     }
     bool nodes = false;
@@ -513,6 +538,7 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
         if (read) {
             reading r = {forest, list, i};
             es_parallel_for(context, tree->leaf_count, 1024, read_some, &r);
+            note_plain(forest, i);
         }
         if (!state->work) continue;
         changed = true;

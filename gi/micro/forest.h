@@ -53,7 +53,7 @@ typedef struct es_point_forest {
     size_t node_count, leaf_count;
     /* of nodes */
     es_point_node* nodes;
-    es_point_node_float* float_nodes; /* tree's local space; what the others are rounded from */
+    es_point_node_float* float_nodes; /* tree's local space; what the others are rounded from; NULL with es_forest_request.packed_only */
     float* radiance[3];        /* W/(m² sr), the mean over the node's area */
     float* area;               /* m² */
     uint32_t* albedo;          /* RGB9E5: share of the irradiance that is reflected, lobe included, the mean over the area */
@@ -63,6 +63,7 @@ typedef struct es_point_forest {
     uint32_t* normal;          /* world, octahedral 2 × 16 bits as the G-buffer has it, of the side that the leaf is */
     uint32_t *albedo_rg, *albedo_b, *surface; /* G-buffer words */
     uint32_t *triangle, *barycentric;  /* as es_scene_points has them */
+    float radius;              /* m: of the root of the tree of trees */
     uint64_t version;          /* differs whenever anything above but light differs */
     struct es_forest_private* own; /* what updates need (gi/micro/forest.c) */
 } es_point_forest;
@@ -70,6 +71,7 @@ typedef struct es_point_forest {
 typedef struct es_forest_request {
     uint32_t points;           /* of all trees together: at most; each tree has a power of two, by its area and the instance's point_weight */
     float rebuild;             /* a deforming tree is split anew when the measure of gi/micro/forest.c passes this multiple of what it was after the split */
+    bool packed_only;          /* float nodes are not kept: their memory, and the time to write it, is spared */
 } es_forest_request;
 
 typedef struct es_forest_update {

@@ -5,17 +5,11 @@
 
 #include "gi/micro/forest.h"
 
-/* ---- one tree's nodes, for the kernels ----------------------------------------------------------------------------------------------- */
+/* ---- for the kernels ------------------------------------------------------------------------------------------------------------------ */
 
-/* Arrays begin at the tree's own nodes and leaves; leaf k is node leaf_count + k. */
-typedef struct es_tree_nodes {
-    es_point_node_float* floats;
-    es_point_node* packed;
-    float* radiance[3];
-    float* area;
-    uint32_t *albedo, *emission;
-    uint32_t leaf_count;
-} es_tree_nodes;
+/* Nodes of a complete tree in columns, as in a heap: node 1 is the root, node i has children 2i and 2i + 1. */
+enum { ES_NODE_X, ES_NODE_Y, ES_NODE_Z, ES_NODE_RADIUS, ES_NODE_AXIS_X, ES_NODE_AXIS_Y, ES_NODE_AXIS_Z, ES_NODE_SINE, ES_NODE_SLAB, ES_NODE_COLUMNS };
+typedef struct es_node_columns { float* of[ES_NODE_COLUMNS]; } es_node_columns;
 
 /* A disc's shape follows its triangle. With u = b - a, v = c - a of the triangle as it is now, its axes are
  *     t1 = along · u,   t2 = across · (v - shear · u),
@@ -23,28 +17,42 @@ typedef struct es_tree_nodes {
  * circle of the same area, and the square root of the larger eigenvalue of the gram of t1, t2 is the radius of the disc that covers the stretched one. */
 typedef struct es_leaf_shapes { float *along, *across, *shear; } es_leaf_shapes; /* along < 0: a hole in the surface, which has no disc */
 
+/* Arrays begin at the tree's first leaf. */
 typedef struct es_leaf_job {
     const es_raster_mesh* mesh;
     const float* positions;            /* the mesh's, or those at rest */
     float u[9];                        /* columns; upper triangular */
     float cofactors[9];                /* of u over its largest element, for normals */
+    float magnify;                     /* edges times this are about 1 or less, and squares of areas no denormals */
     float side;                        /* 1: front, -1: back */
     const uint32_t *triangle, *barycentric;
     es_leaf_shapes shapes;
-    es_tree_nodes nodes;
+    es_node_columns columns;           /* leaf `begin` is node `first`; NULL: places in the world only */
+    uint32_t first;
+    float* area;                       /* of leaf 0; with columns */
+    float rotation[9], translation[3];
+    float *x, *y, *z;                  /* NULL: nodes only */
+    uint32_t* normal;
 } es_leaf_job;
 
-typedef struct es_pose_job {
-    float rotation[9], translation[3];
-    es_tree_nodes nodes;
-    float *x, *y, *z;
-    uint32_t* normal;
-} es_pose_job;
-
-typedef struct es_quantise_job {
+/* How nodes are rounded. */
+typedef struct es_node_frame {
     float low[3], step[3], radius_step;
-    es_tree_nodes nodes;
-} es_quantise_job;
+    float error;                       /* m: of a decoded centre */
+} es_node_frame;
+
+/* What light there is at a tree's nodes; arrays begin at the tree's own. */
+typedef struct es_node_light {
+    float* radiance[3];
+    const float* area;
+    es_point_node* packed;
+} es_node_light;
+
+/* What a tree's nodes reflect and emit, likewise. */
+typedef struct es_node_looks {
+    uint32_t *albedo, *emission;
+    const float* area;
+} es_node_looks;
 
 /* A disc's radius over that of the circle of the area it stands for, so that discs leave no holes between them. */
 #define ES_POINT_OVERLAP 1.5f
@@ -96,7 +104,7 @@ void es_tree_split_any(es_split_point* points, uint32_t count);
 
 /* ---- nodes ------------------------------------------------------------------------------------------------------------------------------------- */
 
-enum { ES_TREE_BLOCK = 4096 };  /* leaves that one task takes with all nodes above them; a power of two */
+enum { ES_TREE_BLOCK = 2048 };  /* leaves that one task takes with all nodes above them; a power of two */
 
 /* The block-th ES_TREE_BLOCK leaves of a tree, or all, if it has fewer. */
 typedef struct es_tree_task {
@@ -121,7 +129,10 @@ typedef struct es_tree_state {
     uint64_t revision;
     double measure, base;       /* of the tree as it is, and after it was split: squared radii of all inner nodes over the leaves' area */
     uint32_t work;              /* es_tree_work */
-    uint32_t holes;             /* leaves that have no disc */
+    size_t upper;               /* its first in es_forest_private.upper: twice as many nodes as it has blocks, whose roots are the leaves there */
+    float low[3], high[3];      /* box of the mesh's vertices in the tree's space */
+    bool again;                 /* its root is larger than its frame was made for */
+    bool plain;                 /* all leaves have the same looks, and so have all nodes */
 } es_tree_state;
 
 struct es_forest_private {
@@ -131,13 +142,19 @@ struct es_forest_private {
     es_leaf_shapes shapes;      /* of the leaves */
     es_tree_task* tasks;
     size_t task_count;
+    es_node_columns upper;      /* nodes above blocks, of all trees, and those of the tree of trees */
+    size_t upper_count;
+    es_node_columns scratch;    /* nodes of a block for each worker: twice ES_TREE_BLOCK */
+    size_t scratch_count;
+    bool floats;                /* float nodes are kept */
     uint64_t materials;
 };
 
-es_tree_nodes es_forest_nodes(const es_point_forest* forest, const es_point_tree* tree);
-/* Does the states' work; with `rest`, nodes of the pose at rest and nothing else. */
+/* Does the states' work; with `rest`, measures trees in their pose at rest and nothing else. */
 void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw_list* list, bool rest);
-/* The tree of trees; `order` holds two es_split_point for each of its leaves. */
+/* Where a tree's leaves are in its own space; points[k].index = k. */
+void es_forest_stand(es_context* context, const es_point_forest* forest, uint32_t tree, es_split_point* points);
+/* The tree of trees; `order` holds an es_split_point for each tree. */
 void es_forest_refit_top(es_context* context, es_point_forest* forest, es_split_point* order);
 
 #endif

@@ -138,7 +138,7 @@ static void gather_cells(void* user, uint32_t begin, uint32_t end, uint32_t work
 
 static float extent_of(const es_point_forest* forest)
 {
-    return forest->tree_count ? es_maxf(2.0f * forest->float_nodes[forest->top.first + 1].radius, 1e-9f) : 1.0f;
+    return forest->tree_count ? es_maxf(2.0f * forest->radius, 1e-9f) : 1.0f;
 }
 
 static es_result gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, uint32_t count, float* const result[3], es_micro_stats* stats, es_micro_pixel* picture)

@@ -1,4 +1,8 @@
-/* Nodes of the trees, from the leaves up: blocks of leaves with what is above them, in parallel, then what is above the blocks. */
+/* Nodes of the trees, from the leaves up: blocks of leaves with what is above them, in parallel, then what is above the blocks.
+ *
+ * A block's nodes are made in columns that stay in the cache, and rounded from there. Of a tree of several blocks the frame of the rounding is known before its
+ * root is: centres are within the box of the vertices, as each is between its children's, and radii are taken to be below ES_TREE_REACH times the box'
+ * diagonal. A tree whose root is larger is done again. */
 #include <string.h>
 
 #include "gi/kernel_table.h"
@@ -6,30 +10,86 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 
-es_tree_nodes es_forest_nodes(const es_point_forest* forest, const es_point_tree* tree)
-{
-    const size_t at = tree->first;
-    return (es_tree_nodes){forest->float_nodes + at, forest->nodes + at, {forest->radiance[0] + at, forest->radiance[1] + at, forest->radiance[2] + at}, forest->area + at,
-        forest->albedo + at, forest->emission + at, tree->leaf_count};
-}
+#define ES_TREE_REACH 0.75f
 
 static uint32_t block_size(const es_point_tree* tree) { return tree->leaf_count < ES_TREE_BLOCK ? tree->leaf_count : ES_TREE_BLOCK; }
+static uint32_t blocks_of(const es_point_tree* tree) { return tree->leaf_count / block_size(tree); }
 
 typedef struct refitting {
     es_point_forest* forest;
     const es_draw_list* list;
     const es_gi_kernels* kernels;
-    bool rest;
+    bool rest, again;
 } refitting;
 
-static void place_leaves(const refitting* r, const es_point_tree* tree, const es_tree_nodes* nodes, uint32_t begin, uint32_t end)
+static es_node_columns columns_at(const es_node_columns* columns, size_t first)
 {
-    const es_point_forest* forest = r->forest;
+    es_node_columns at;
+    for (int k = 0; k < ES_NODE_COLUMNS; k++) at.of[k] = columns->of[k] + first;
+    return at;
+}
+
+static es_node_looks looks_of(const es_point_forest* forest, const es_point_tree* tree) { return (es_node_looks){forest->albedo + tree->first, forest->emission + tree->first, forest->area + tree->first}; }
+static es_node_light light_of(const es_point_forest* forest, const es_point_tree* tree)
+{
+    const size_t at = tree->first;
+    return (es_node_light){{forest->radiance[0] + at, forest->radiance[1] + at, forest->radiance[2] + at}, forest->area + at, forest->nodes + at};
+}
+
+/* ---- the frame of the quantised nodes ----------------------------------------------------------------------------------------- */
+
+static es_node_frame frame_of(const float low[3], const float high[3], float radius)
+{
+    es_node_frame frame = {.low = {low[0], low[1], low[2]}};
+    float square = 0.0f, farthest = 0.0f;
+    for (int k = 0; k < 3; k++) {
+        frame.step[k] = (high[k] - low[k]) * (1.0f / 65535.0f);
+        square += frame.step[k] * frame.step[k];
+        farthest += es_maxf(es_absf(low[k]), es_absf(high[k]));
+    }
+    frame.error = 0.501f * es_sqrt(square) + 2.5e-7f * farthest;
+    frame.radius_step = (radius + frame.error) * (1.00001f / 65533.0f);
+    return frame;
+}
+
+static float diagonal(const es_tree_state* state)
+{
+    float square = 0.0f;
+    for (int k = 0; k < 3; k++) square += (state->high[k] - state->low[k]) * (state->high[k] - state->low[k]);
+    return es_sqrt(square);
+}
+
+static void keep_frame(es_point_tree* tree, const es_node_frame* frame)
+{
+    memcpy(tree->low, frame->low, sizeof tree->low);
+    memcpy(tree->step, frame->step, sizeof tree->step);
+    tree->radius_step = frame->radius_step;
+}
+
+/* `count` nodes of the columns from `first` on become those of the tree from `node` on. */
+static void store(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t node, uint32_t count)
+{
+    es_point_forest* forest = r->forest;
+    r->kernels->forest_quantise(frame, columns, first, count, forest->nodes + tree->first + node);
+    if (!forest->own->floats) return;
+    for (uint32_t i = 0; i < count; i++) {
+        es_point_node_float* out = &forest->float_nodes[tree->first + node + i];
+        float* const to[ES_NODE_COLUMNS] = {&out->position[0], &out->position[1], &out->position[2], &out->radius, &out->axis[0], &out->axis[1], &out->axis[2], &out->sine, &out->slab};
+        for (int k = 0; k < ES_NODE_COLUMNS; k++) *to[k] = columns->of[k][first + i];
+    }
+}
+
+/* ---- blocks ---------------------------------------------------------------------------------------------------------------------------- */
+
+/* Without columns. */
+static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree* tree, bool rest)
+{
     const es_tree_state* state = &forest->own->states[tree - forest->trees];
     const es_leaf_shapes* shapes = &forest->own->shapes;
-    es_leaf_job job = {.mesh = state->mesh, .positions = r->rest && state->mesh->rest_positions ? state->mesh->rest_positions : state->mesh->positions,
-        .side = tree->back ? -1.0f : 1.0f, .triangle = forest->triangle + tree->first_leaf, .barycentric = forest->barycentric + tree->first_leaf,
-        .shapes = {shapes->along + tree->first_leaf, shapes->across + tree->first_leaf, shapes->shear + tree->first_leaf}, .nodes = *nodes};
+    const size_t leaf = tree->first_leaf;
+    es_leaf_job job = {.mesh = state->mesh, .positions = rest && state->mesh->rest_positions ? state->mesh->rest_positions : state->mesh->positions,
+        .side = tree->back ? -1.0f : 1.0f, .triangle = forest->triangle + leaf, .barycentric = forest->barycentric + leaf,
+        .shapes = {shapes->along + leaf, shapes->across + leaf, shapes->shear + leaf}, .area = forest->area + tree->first + tree->leaf_count};
     memcpy(job.u, state->u, sizeof job.u);
     /* over the largest, as cofactors of a tiny scene would underflow */
     float largest = 0.0f, u[9];
@@ -37,58 +97,67 @@ static void place_leaves(const refitting* r, const es_point_tree* tree, const es
     for (int i = 0; i < 9; i++) u[i] = largest > 0.0f ? job.u[i] / largest : 0.0f;
     const float cofactors[9] = {u[4] * u[8], -u[3] * u[8], u[3] * u[7] - u[4] * u[6], 0, u[0] * u[8], -u[0] * u[7], 0, 0, u[0] * u[4]};
     memcpy(job.cofactors, cofactors, sizeof cofactors);
-    r->kernels->forest_leaves(&job, begin, end);
+    /* a power of two, so that nothing is rounded */
+    job.magnify = es_exp2(-es_floor(es_log2(es_clampf(diagonal(state), 1e-30f, 1e30f))));
+    memcpy(job.rotation, tree->rotation, sizeof job.rotation);
+    memcpy(job.translation, tree->translation, sizeof job.translation);
+    return job;
 }
 
-/* Of each level the nodes above leaves [block size · block, …), from the leaves' parents up to the block's own root. */
-#define FOR_LEVELS_OF_BLOCK(tree, block, begin, end)                                                                                                                        \
-    for (uint32_t size_ = block_size(tree) / 2, level_ = (tree)->leaf_count / 2, begin = level_ + (block) * size_, end = begin + size_; size_; \
-         size_ /= 2, level_ /= 2, begin = level_ + (block) * size_, end = begin + size_)
+static void make_block(const refitting* r, es_tree_task* task, const es_point_tree* tree, es_leaf_job* job, const es_node_columns* scratch)
+{
+    es_point_forest* forest = r->forest;
+    const es_tree_state* state = &forest->own->states[task->tree];
+    const uint32_t size = block_size(tree), blocks = blocks_of(tree), begin = task->block * size;
+    float* area = forest->area + tree->first;
+    job->columns = *scratch;
+    job->first = size;
+    r->kernels->forest_leaves(job, begin, begin + size);
+    task->sum = 0.0f;
+    /* the block's level of `level` nodes are the tree's from (blocks + block) level on */
+    for (uint32_t level = size / 2; level; level /= 2) {
+        const uint32_t at = (blocks + task->block) * level;
+        float sum;
+        r->kernels->forest_merge(scratch, level, area + 2 * (size_t)at, area + at, &sum);
+        task->sum += sum;
+    }
+    for (int k = 0; k < ES_NODE_COLUMNS; k++) forest->own->upper.of[k][state->upper + blocks + task->block] = scratch->of[k][1];
+    if (r->rest) return;
+    es_node_frame frame = frame_of(state->low, state->high, ES_TREE_REACH * diagonal(state));
+    if (blocks == 1 || r->again) frame = frame_of(state->low, state->high, es_maxf(blocks == 1 ? scratch->of[ES_NODE_RADIUS][1] : forest->own->upper.of[ES_NODE_RADIUS][state->upper + 1], 0.0f));
+    for (uint32_t level = size; level; level /= 2) store(r, tree, &frame, scratch, level, (blocks + task->block) * level, level);
+}
 
 static void refit_block(void* user, uint32_t first, uint32_t last, uint32_t worker)
 {
     const refitting* r = user;
     es_point_forest* forest = r->forest;
+    const es_node_columns scratch = columns_at(&forest->own->scratch, 2 * ES_TREE_BLOCK * (size_t)worker);
     for (uint32_t i = first; i < last; i++) {
         es_tree_task* task = &forest->own->tasks[i];
         const es_point_tree* tree = &forest->trees[task->tree];
-        const uint32_t work = forest->own->states[task->tree].work;
-        if (!work) continue;
-        const es_tree_nodes nodes = es_forest_nodes(forest, tree);
-        const uint32_t begin = task->block * block_size(tree), end = begin + block_size(tree);
-        if (work & ES_TREE_NODES) {
-            place_leaves(r, tree, &nodes, begin, end);
-            task->sum = 0.0f;
-            FOR_LEVELS_OF_BLOCK(tree, task->block, from, to)
-            {
-                float sum;
-                r->kernels->forest_merge(&nodes, from, to, &sum);
-                task->sum += sum;
-            }
+        const es_tree_state* state = &forest->own->states[task->tree];
+        const uint32_t work = state->work, size = block_size(tree);
+        if (!work || (r->again && !state->again)) continue;
+        es_leaf_job job = leaves_of(forest, tree, r->rest);
+        if (!r->rest && work & ES_TREE_POSE) {
+            job.x = forest->x + tree->first_leaf;
+            job.y = forest->y + tree->first_leaf;
+            job.z = forest->z + tree->first_leaf;
+            job.normal = forest->normal + tree->first_leaf;
         }
-        if (r->rest) continue;
-        if (work & ES_TREE_POSE) {
-            es_pose_job job = {.nodes = nodes, .x = forest->x + tree->first_leaf, .y = forest->y + tree->first_leaf, .z = forest->z + tree->first_leaf,
-                .normal = forest->normal + tree->first_leaf};
-            memcpy(job.rotation, tree->rotation, sizeof job.rotation);
-            memcpy(job.translation, tree->translation, sizeof job.translation);
-            r->kernels->forest_pose(&job, begin, end);
+        if (work & ES_TREE_NODES) make_block(r, task, tree, &job, &scratch);
+        else if (job.x) r->kernels->forest_leaves(&job, task->block * size, (task->block + 1) * size);
+        if (r->rest || state->plain || !(work & ES_TREE_LOOKS)) continue;
+        const es_node_looks looks = looks_of(forest, tree);
+        for (uint32_t level = size / 2; level; level /= 2) {
+            const uint32_t at = (blocks_of(tree) + task->block) * level;
+            r->kernels->forest_blend(&looks, at, at + level);
         }
-        if (work & ES_TREE_LOOKS) FOR_LEVELS_OF_BLOCK(tree, task->block, from, to) r->kernels->forest_blend(&nodes, from, to);
     }
 }
 
-/* The frame of the quantised nodes: the root's box. */
-static void set_frame(es_point_tree* tree, const es_point_node_float* root)
-{
-    const float radius = es_maxf(root->radius, 0.0f);
-    for (int k = 0; k < 3; k++) {
-        tree->low[k] = root->position[k] - radius;
-        tree->step[k] = radius * (2.0f / 65535.0f);
-    }
-    /* the largest radius and what the centre's rounding adds to it, twice over */
-    tree->radius_step = radius * ((1.0f + 4.0f / 65535.0f) / 65533.0f);
-}
+/* ---- above the blocks ------------------------------------------------------------------------------------------------------------------- */
 
 static void refit_upper(void* user, uint32_t first, uint32_t last, uint32_t worker)
 {
@@ -97,54 +166,79 @@ static void refit_upper(void* user, uint32_t first, uint32_t last, uint32_t work
     for (uint32_t i = first; i < last; i++) {
         es_point_tree* tree = &forest->trees[i];
         es_tree_state* state = &forest->own->states[i];
-        const es_tree_nodes nodes = es_forest_nodes(forest, tree);
-        const uint32_t blocks = tree->leaf_count / block_size(tree);
-        if (state->work & ES_TREE_NODES) {
-            double total = 0.0;
-            for (uint32_t level = blocks / 2; level; level /= 2) {
-                float sum;
-                r->kernels->forest_merge(&nodes, level, 2 * level, &sum);
-                total += (double)sum;
-            }
-            state->measure = total;
-            if (!r->rest) set_frame(tree, &nodes.floats[1]);
+        const uint32_t blocks = blocks_of(tree);
+        if (!r->rest && !state->plain && state->work & ES_TREE_LOOKS) {
+            const es_node_looks looks = looks_of(forest, tree);
+            for (uint32_t level = blocks / 2; level; level /= 2) r->kernels->forest_blend(&looks, level, 2 * level);
         }
-        if (!r->rest && state->work & ES_TREE_LOOKS)
-            for (uint32_t level = blocks / 2; level; level /= 2) r->kernels->forest_blend(&nodes, level, 2 * level);
+        if (!(state->work & ES_TREE_NODES) || (r->again && !state->again)) continue;
+        const es_node_columns upper = columns_at(&forest->own->upper, state->upper);
+        float* area = forest->area + tree->first;
+        double total = 0.0;
+        for (uint32_t level = blocks / 2; level; level /= 2) {
+            float sum;
+            r->kernels->forest_merge(&upper, level, area + 2 * (size_t)level, area + level, &sum);
+            total += (double)sum;
+        }
+        state->measure = total;
+        if (r->rest) continue;
+        const float radius = es_maxf(upper.of[ES_NODE_RADIUS][1], 0.0f), guess = ES_TREE_REACH * diagonal(state);
+        state->again = blocks > 1 && radius > guess && !r->again;
+        const es_node_frame frame = frame_of(state->low, state->high, blocks == 1 || r->again ? radius : guess);
+        keep_frame(tree, &frame);
+        for (uint32_t level = blocks / 2; level; level /= 2) store(r, tree, &frame, &upper, level, level, level);
     }
 }
 
-static es_quantise_job quantising(const es_point_tree* tree, const es_tree_nodes* nodes)
+typedef struct boxing { const es_gi_kernels* kernels; const float *positions, *u; float (*boxes)[6]; uint32_t count; } boxing;
+enum { BOX_VERTICES = 16384, BOX_PARTS = 256 };
+
+static void box_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
-    es_quantise_job job = {.radius_step = tree->radius_step, .nodes = *nodes};
-    memcpy(job.low, tree->low, sizeof job.low);
-    memcpy(job.step, tree->step, sizeof job.step);
-    return job;
+    const boxing* b = user;
+    float* box = b->boxes[begin / BOX_VERTICES % BOX_PARTS];
+    float low[3], high[3];
+    b->kernels->forest_box(b->positions, b->u, begin, end, low, high);
+    for (int k = 0; k < 3; k++) {
+        box[k] = low[k];
+        box[3 + k] = high[k];
+    }
 }
 
-static void quantise_block(void* user, uint32_t first, uint32_t last, uint32_t worker)
+static void find_box(es_context* context, const refitting* r, es_tree_state* state)
 {
-    const refitting* r = user;
-    const es_point_forest* forest = r->forest;
-    for (uint32_t i = first; i < last; i++) {
-        const es_tree_task* task = &forest->own->tasks[i];
-        const es_point_tree* tree = &forest->trees[task->tree];
-        if (!(forest->own->states[task->tree].work & ES_TREE_NODES)) continue;
-        const es_tree_nodes nodes = es_forest_nodes(forest, tree);
-        const es_quantise_job job = quantising(tree, &nodes);
-        const uint32_t size = block_size(tree), begin = tree->leaf_count + task->block * size;
-        r->kernels->forest_quantise(&job, begin, begin + size);
-        FOR_LEVELS_OF_BLOCK(tree, task->block, from, to) r->kernels->forest_quantise(&job, from, to);
-        if (task->block == 0 && tree->leaf_count > size) r->kernels->forest_quantise(&job, 1, tree->leaf_count / size);
+    const es_raster_mesh* mesh = state->mesh;
+    float boxes[BOX_PARTS][6];
+    for (int k = 0; k < 3; k++) {
+        state->low[k] = ES_POINT_FARTHEST;
+        state->high[k] = -ES_POINT_FARTHEST;
+    }
+    for (uint32_t first = 0; first < mesh->vertex_count; first += BOX_PARTS * BOX_VERTICES) {
+        const uint32_t left = mesh->vertex_count - first, count = left < BOX_PARTS * BOX_VERTICES ? left : BOX_PARTS * BOX_VERTICES;
+        boxing b = {r->kernels, mesh->positions + 4 * (size_t)first, state->u, boxes, count};
+        es_parallel_for(context, count, BOX_VERTICES, box_some, &b);
+        for (uint32_t part = 0; part < (count + BOX_VERTICES - 1) / BOX_VERTICES; part++)
+            for (int k = 0; k < 3; k++) {
+                state->low[k] = es_minf(state->low[k], boxes[part][k]);
+                state->high[k] = es_maxf(state->high[k], boxes[part][3 + k]);
+            }
     }
 }
 
 void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw_list* list, bool rest)
 {
     struct es_forest_private* own = forest->own;
-    refitting r = {forest, list, es_gi_kernel_table(es_context_isa(context)), rest};
+    refitting r = {forest, list, es_gi_kernel_table(es_context_isa(context)), rest, false};
+    if (!rest)
+        for (uint32_t i = 0; i < forest->tree_count; i++)
+            if (own->states[i].work & ES_TREE_NODES) find_box(context, &r, &own->states[i]);
     es_parallel_for(context, (uint32_t)own->task_count, 1, refit_block, &r);
     es_parallel_for(context, forest->tree_count, 16, refit_upper, &r);
+    for (uint32_t i = 0; i < forest->tree_count; i++) r.again = r.again || (!rest && own->states[i].work & ES_TREE_NODES && own->states[i].again);
+    if (r.again) { /* discs reach far beyond their triangles */
+        es_parallel_for(context, (uint32_t)own->task_count, 1, refit_block, &r);
+        es_parallel_for(context, forest->tree_count, 16, refit_upper, &r);
+    }
     for (size_t i = 0; i < own->task_count; i++)
         if (own->states[own->tasks[i].tree].work & ES_TREE_NODES) own->states[own->tasks[i].tree].measure += (double)own->tasks[i].sum;
     for (uint32_t i = 0; i < forest->tree_count; i++)
@@ -152,7 +246,27 @@ void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw
             const double area = (double)forest->area[forest->trees[i].first + 1];
             own->states[i].measure = area > 0.0 ? own->states[i].measure / area : 0.0;
         }
-    if (!rest) es_parallel_for(context, (uint32_t)own->task_count, 1, quantise_block, &r);
+}
+
+typedef struct standing { const es_gi_kernels* kernels; const es_point_forest* forest; const es_point_tree* tree; es_split_point* points; } standing;
+
+static void stand_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const standing* s = user;
+    const es_node_columns scratch = columns_at(&s->forest->own->scratch, 2 * ES_TREE_BLOCK * (size_t)worker);
+    es_leaf_job job = leaves_of(s->forest, s->tree, false);
+    job.columns = scratch;
+    s->kernels->forest_leaves(&job, begin, end);
+    for (uint32_t i = begin; i < end; i++) {
+        for (int k = 0; k < 3; k++) s->points[i].position[k] = scratch.of[k][i - begin];
+        s->points[i].index = i;
+    }
+}
+
+void es_forest_stand(es_context* context, const es_point_forest* forest, uint32_t tree, es_split_point* points)
+{
+    standing s = {es_gi_kernel_table(es_context_isa(context)), forest, &forest->trees[tree], points};
+    es_parallel_for(context, s.tree->leaf_count, ES_TREE_BLOCK, stand_some, &s);
 }
 
 /* ---- the tree of trees ----------------------------------------------------------------------------------------------------- */
@@ -168,58 +282,69 @@ static void fill_slots(es_split_point* trees, uint32_t count, uint32_t* slots, u
     fill_slots(trees + (count - count / 2), count / 2, slots + size / 2, size / 2);
 }
 
-static void top_leaf(const es_point_forest* forest, uint32_t slot)
+/* A tree's root in the world. */
+static void root_of(const es_point_forest* forest, uint32_t index, float out[ES_NODE_COLUMNS])
 {
-    const es_tree_nodes top = es_forest_nodes(forest, &forest->top);
-    const uint32_t node = forest->top.leaf_count + slot, index = forest->top_trees[slot];
-    es_point_node_float* out = &top.floats[node];
-    *out = (es_point_node_float){.radius = -1.0f, .axis = {0, 1, 0}};
-    top.area[node] = 0.0f;
-    top.albedo[node] = top.emission[node] = 0;
-    if (index == UINT32_MAX) return;
     const es_point_tree* tree = &forest->trees[index];
-    const es_tree_nodes nodes = es_forest_nodes(forest, tree);
-    const es_point_node_float* root = &nodes.floats[1];
     const float* m = tree->rotation;
-    float reach = 0.0f;
+    float root[ES_NODE_COLUMNS], reach = 0.0f;
+    for (int k = 0; k < ES_NODE_COLUMNS; k++) root[k] = forest->own->upper.of[k][forest->own->states[index].upper + 1];
     for (int k = 0; k < 3; k++) {
-        out->position[k] = m[k] * root->position[0] + m[3 + k] * root->position[1] + m[6 + k] * root->position[2] + tree->translation[k];
-        out->axis[k] = m[k] * root->axis[0] + m[3 + k] * root->axis[1] + m[6 + k] * root->axis[2];
-        reach += es_absf(root->position[k]) + es_absf(out->position[k]);
+        out[ES_NODE_X + k] = m[k] * root[ES_NODE_X] + m[3 + k] * root[ES_NODE_Y] + m[6 + k] * root[ES_NODE_Z] + tree->translation[k];
+        out[ES_NODE_AXIS_X + k] = m[k] * root[ES_NODE_AXIS_X] + m[3 + k] * root[ES_NODE_AXIS_Y] + m[6 + k] * root[ES_NODE_AXIS_Z];
+        reach += es_absf(root[ES_NODE_X + k]) + es_absf(out[ES_NODE_X + k]);
     }
     /* what the rounding of the pose may have moved it */
-    out->radius = root->radius < 0.0f ? root->radius : root->radius * (1.0f + 1e-6f) + reach * 5e-7f;
-    out->sine = root->sine > 1.0f ? 2.0f : es_minf(root->sine + 2e-6f, 1.0f);
-    out->slab = es_minf(root->slab + reach * 5e-7f, es_maxf(out->radius, 0.0f));
-    top.area[node] = nodes.area[1];
-    top.albedo[node] = nodes.albedo[1];
-    top.emission[node] = nodes.emission[1];
+    out[ES_NODE_RADIUS] = root[ES_NODE_RADIUS] < 0.0f ? -1.0f : root[ES_NODE_RADIUS] * (1.0f + 1e-6f) + reach * 5e-7f;
+    out[ES_NODE_SINE] = root[ES_NODE_SINE] > 1.0f ? 2.0f : es_minf(root[ES_NODE_SINE] + 2e-6f, 1.0f);
+    out[ES_NODE_SLAB] = es_minf(root[ES_NODE_SLAB] + reach * 5e-7f, es_maxf(out[ES_NODE_RADIUS], 0.0f));
+}
+
+static void top_leaf(const es_point_forest* forest, const es_node_columns* columns, uint32_t slot)
+{
+    const es_point_tree* top = &forest->top;
+    const uint32_t node = top->leaf_count + slot, index = forest->top_trees[slot];
+    float values[ES_NODE_COLUMNS] = {[ES_NODE_RADIUS] = -1.0f, [ES_NODE_AXIS_Y] = 1.0f};
+    const size_t root = index == UINT32_MAX ? 0 : forest->trees[index].first + 1;
+    if (index != UINT32_MAX) root_of(forest, index, values);
+    for (int k = 0; k < ES_NODE_COLUMNS; k++) columns->of[k][node] = values[k];
+    forest->area[top->first + node] = root ? forest->area[root] : 0.0f;
+    forest->albedo[top->first + node] = root ? forest->albedo[root] : 0;
+    forest->emission[top->first + node] = root ? forest->emission[root] : 0;
 }
 
 void es_forest_refit_top(es_context* context, es_point_forest* forest, es_split_point* order)
 {
-    const es_gi_kernels* kernels = es_gi_kernel_table(es_context_isa(context));
+    refitting r = {.forest = forest, .kernels = es_gi_kernel_table(es_context_isa(context))};
     es_point_tree* top = &forest->top;
+    forest->radius = 0.0f;
     if (!top->leaf_count) return;
-    const es_tree_nodes nodes = es_forest_nodes(forest, top);
-    /* leaves in the trees' order first, for their places */
-    for (uint32_t i = 0; i < top->leaf_count; i++) forest->top_trees[i] = i < forest->tree_count ? i : UINT32_MAX;
+    const es_node_columns columns = columns_at(&forest->own->upper, forest->own->upper_count - 2 * (size_t)top->leaf_count);
+    float low[3], high[3];
     for (uint32_t i = 0; i < forest->tree_count; i++) {
-        top_leaf(forest, i);
-        memcpy(order[i].position, nodes.floats[top->leaf_count + i].position, sizeof order[i].position);
+        float root[ES_NODE_COLUMNS];
+        root_of(forest, i, root);
         order[i].index = i;
+        for (int k = 0; k < 3; k++) {
+            order[i].position[k] = root[k];
+            low[k] = i ? es_minf(low[k], root[k]) : root[k];
+            high[k] = i ? es_maxf(high[k], root[k]) : root[k];
+        }
     }
     es_tree_split_any(order, forest->tree_count);
     fill_slots(order, forest->tree_count, forest->top_trees, top->leaf_count);
-    for (uint32_t i = 0; i < top->leaf_count; i++) top_leaf(forest, i);
+    for (uint32_t i = 0; i < top->leaf_count; i++) top_leaf(forest, &columns, i);
+    const es_node_looks looks = looks_of(forest, top);
+    float* area = forest->area + top->first;
     for (uint32_t level = top->leaf_count / 2; level; level /= 2) {
         float sum;
-        kernels->forest_merge(&nodes, level, 2 * level, &sum);
-        kernels->forest_blend(&nodes, level, 2 * level);
+        r.kernels->forest_merge(&columns, level, area + 2 * (size_t)level, area + level, &sum);
+        r.kernels->forest_blend(&looks, level, 2 * level);
     }
-    set_frame(top, &nodes.floats[1]);
-    const es_quantise_job job = quantising(top, &nodes);
-    kernels->forest_quantise(&job, 1, 2 * top->leaf_count);
+    forest->radius = es_maxf(columns.of[ES_NODE_RADIUS][1], 0.0f);
+    const es_node_frame frame = frame_of(low, high, forest->radius);
+    keep_frame(top, &frame);
+    store(&r, top, &frame, &columns, 1, 1, 2 * top->leaf_count - 1);
 }
 
 /* ---- light ------------------------------------------------------------------------------------------------------------------------ */
@@ -231,22 +356,21 @@ static void pull_block(void* user, uint32_t first, uint32_t last, uint32_t worke
     for (uint32_t i = first; i < last; i++) {
         const es_tree_task* task = &forest->own->tasks[i];
         const es_point_tree* tree = &forest->trees[task->tree];
-        const es_tree_nodes nodes = es_forest_nodes(forest, tree);
-        const uint32_t size = block_size(tree), begin = tree->leaf_count + task->block * size;
-        r->kernels->forest_pack(&nodes, begin, begin + size);
-        FOR_LEVELS_OF_BLOCK(tree, task->block, from, to)
-        {
-            r->kernels->forest_pull(&nodes, from, to);
-            r->kernels->forest_pack(&nodes, from, to);
+        const es_node_light light = light_of(forest, tree);
+        const uint32_t size = block_size(tree);
+        for (uint32_t level = size; level; level /= 2) {
+            const uint32_t at = (blocks_of(tree) + task->block) * level;
+            if (level < size) r->kernels->forest_pull(&light, at, at + level);
+            r->kernels->forest_pack(&light, at, at + level);
         }
     }
 }
 
-static void pull_upper(const es_gi_kernels* kernels, const es_tree_nodes* nodes, uint32_t level)
+static void pull_upper(const es_gi_kernels* kernels, const es_node_light* light, uint32_t level)
 {
     for (; level; level /= 2) {
-        kernels->forest_pull(nodes, level, 2 * level);
-        kernels->forest_pack(nodes, level, 2 * level);
+        kernels->forest_pull(light, level, 2 * level);
+        kernels->forest_pack(light, level, 2 * level);
     }
 }
 
@@ -256,15 +380,16 @@ void es_forest_pull(es_context* context, es_point_forest* forest)
     refitting r = {.forest = forest, .kernels = es_gi_kernel_table(es_context_isa(context))};
     es_parallel_for(context, (uint32_t)forest->own->task_count, 1, pull_block, &r);
     for (uint32_t i = 0; i < forest->tree_count; i++) {
-        const es_tree_nodes nodes = es_forest_nodes(forest, &forest->trees[i]);
-        pull_upper(r.kernels, &nodes, nodes.leaf_count / block_size(&forest->trees[i]) / 2);
+        const es_node_light light = light_of(forest, &forest->trees[i]);
+        pull_upper(r.kernels, &light, blocks_of(&forest->trees[i]) / 2);
     }
-    const es_tree_nodes top = es_forest_nodes(forest, &forest->top);
-    for (uint32_t i = 0; i < top.leaf_count; i++)
+    const es_node_light top = light_of(forest, &forest->top);
+    const uint32_t leaves = forest->top.leaf_count;
+    for (uint32_t i = 0; i < leaves; i++)
         for (int c = 0; c < 3; c++) {
             const uint32_t tree = forest->top_trees[i];
-            top.radiance[c][top.leaf_count + i] = tree == UINT32_MAX ? 0.0f : forest->radiance[c][forest->trees[tree].first + 1];
+            top.radiance[c][leaves + i] = tree == UINT32_MAX ? 0.0f : forest->radiance[c][forest->trees[tree].first + 1];
         }
-    r.kernels->forest_pack(&top, top.leaf_count, 2 * top.leaf_count);
-    pull_upper(r.kernels, &top, top.leaf_count / 2);
+    r.kernels->forest_pack(&top, leaves, 2 * leaves);
+    pull_upper(r.kernels, &top, leaves / 2);
 }
