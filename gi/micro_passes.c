@@ -60,7 +60,7 @@ static es_micro_settings settings_of(const es_renderer_settings* s)
 static es_result bring_forest(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
-    const es_forest_request request = {.points = r->settings.micro_points, .rebuild = r->settings.micro_rebuild};
+    const es_forest_request request = {.points = r->settings.micro_points, .rebuild = r->settings.micro_rebuild, .packed_only = r->settings.micro_nodes == ES_MICRO_QUANTISED};
     es_plan_begin(plan, ES_PASS_FOREST);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);

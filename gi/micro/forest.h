@@ -71,7 +71,7 @@ typedef struct es_point_forest {
 typedef struct es_forest_request {
     uint32_t points;           /* of all trees together: at most; each tree has a power of two, by its area and the instance's point_weight */
     float rebuild;             /* a deforming tree is split anew when the measure of gi/micro/forest.c passes this multiple of what it was after the split */
-    bool packed_only;          /* float nodes are not kept: their memory, and the time to write it, is spared */
+    uint32_t packed_only;      /* not 0: float nodes are not kept: their memory, and the time to write it, is spared */
 } es_forest_request;
 
 typedef struct es_forest_update {
