@@ -212,7 +212,7 @@ static void add_metals(es_scene_builder* builder, const detail* d, es_material s
 
 static void add_floor_ring(es_scene_builder* builder, const detail* d)
 {
-    const float radius = 0.55f, thickness = 0.03f, height = 0.34f;
+    const float radius = 0.55f, thickness = 0.03f, height = 0.22f;
     const es_vec2 profile[] = {{radius, 0}, {radius + thickness, 0}, {radius + thickness, height}, {radius, height}, {radius, 0}};
     es_shape disc = es_build_shape(builder), ring = es_build_shape(builder);
     const es_vec3 place = {1.05f, 0, 2.75f};
@@ -324,7 +324,7 @@ static void add_spot(es_scene_builder* builder, const char* name, es_vec3 place,
 static void add_lights(es_scene_builder* builder)
 {
     add_spot(builder, "beam", es_v3(2.6f, 4.9f, 3.6f), es_v3(0, 1.9f, -1.2f), (const float[3]){1.0f, 0.92f, 0.80f}, 260, 0.46f, 23);
-    add_spot(builder, "ring's beam", es_v3(3.9f, 2.9f, 3.7f), es_v3(1.05f, 0.15f, 2.75f), (const float[3]){1.0f, 0.90f, 0.74f}, 90, 0.24f, 13);
+    add_spot(builder, "ring's beam", es_v3(3.6f, 2.3f, 2.0f), es_v3(1.05f, 0.1f, 2.75f), (const float[3]){1.0f, 0.90f, 0.74f}, 130, 0.26f, 13);
     es_node lantern = es_build_node(builder, "lantern", es_v3(0, 4.3f, 2), es_quat_identity());
     es_light_desc point = es_default_light_desc();
     point.type = ES_LIGHT_POINT;
