@@ -81,7 +81,7 @@ typedef struct player {
     bool paused, quit;
     uint32_t steps;              /* single steps to make */
     bool show_vpls, show_points, hide_all;
-    bool show_help, show_scenes, show_settings, show_graphs, show_timeline;
+    bool show_help, show_scenes, show_settings, show_graphs, show_timeline, show_micro;
     double frame_milliseconds, interface_milliseconds; /* smoothed */
     float seconds;               /* of the last loop */
     player_history history;
@@ -133,6 +133,9 @@ void player_print_settings(const player* p);
 /* ---- player_graphs.c ---- */
 void player_graphs_add(player* p);
 void player_graphs_panel(player* p, canvas_rect rect);
+
+/* ---- player_micro.c ---- */
+void player_micro_panel(player* p, int bottom);
 
 /* ---- player_split.c ---- */
 void player_next_split(player* p);

@@ -31,6 +31,7 @@ static void do_find(player* p)
     ui_edit_on(&p->ui, "settings");
 }
 static void do_graphs(player* p) { p->show_graphs = !p->show_graphs; }
+static void do_micro(player* p) { p->show_micro = !p->show_micro; }
 static void do_timeline(player* p) { p->show_timeline = !p->show_timeline; }
 static void do_hide(player* p) { p->hide_all = !p->hide_all; }
 static void do_larger(player* p) { p->ui.larger += p->ui.scale < 6; }
@@ -39,7 +40,7 @@ static void do_smaller(player* p) { p->ui.larger -= p->ui.scale > 1; }
 /* The innermost first: what is held, then the panels, then the program. */
 static void do_escape(player* p)
 {
-    bool* panels[] = {&p->show_settings, &p->show_scenes, &p->show_graphs, &p->show_help};
+    bool* panels[] = {&p->show_settings, &p->show_scenes, &p->show_graphs, &p->show_micro, &p->show_help};
     if (p->hand.what) {
         player_release(p);
         return;
@@ -167,6 +168,7 @@ static const command commands[] = {
     {'/', PLAIN, false, do_find, "/", "find a setting"},
     {'T', PLAIN, false, do_graphs, "T F4", "graphs: time, flicker, motion"},
     {'Y', PLAIN, false, do_timeline, "Y", "time line"},
+    {'M', CONTROL, false, do_micro, "Ctrl M", "micro-buffers under the mouse"},
     {'U', PLAIN, false, do_hide, "U", "hide everything, show it again"},
     {0, PLAIN, false, NULL, "Tab ↑ ↓ ← →", "between panels, within one"},
     {0, PLAIN, false, NULL, "Enter Delete", "do or type a value, reset it"},

@@ -205,6 +205,7 @@ void player_build_panels(player* p)
         int width = columns(p, 60), height = (bottom - top) * 2 / 3;
         player_graphs_panel(p, (canvas_rect){0, bottom - height, width, height});
     }
+    if (p->show_micro) player_micro_panel(p, bottom);
     if (p->show_settings) {
         int width = columns(p, 48), left = (int)p->canvas.width - width;
         player_settings_panel(p, (canvas_rect){left > 0 ? left : 0, top, width, bottom - top});

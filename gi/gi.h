@@ -183,6 +183,13 @@ ES_API const char* es_image_description(size_t index);
  * "indirect-1" … "indirect-16" are single bounces, black beyond es_renderer_settings.bounces; their lights are shaded again for it. With `temporal`
  * they are of this frame's lights alone, and add up to what was blended with the light of frames before. */
 ES_API es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* image);
+/* Of ES_GI_MICRO: the micro-buffer that light is gathered from at a pixel of the last frame, for what reflects in all directions (by the cosine) or for the `lobe`;
+ * radiance in W/(m² sr), distance in metres, 0 where nothing is; either may be NULL. `warped`: as it is, micro_size² pixels, all of which are worth the same; its
+ * axes are turned as the pixel's place in the picture says. Else laid out over the hemisphere in 128² pixels: the normal in the middle, the angle from it
+ * growing evenly to a right one at the rim of the disc, as who looks out of the surface sees it with the camera's right to the right. Where nothing is gathered, and with other methods, one black pixel. It is
+ * drawn by itself, with a cut of its own, and with the scene's points as they are now. The caller destroys the images. WRONG_STATE before the first frame,
+ * INVALID_ARGUMENT outside the picture. */
+ES_API es_result es_renderer_micro_buffer(es_renderer* renderer, uint32_t x, uint32_t y, bool lobe, bool warped, es_image* radiance, es_image* distance);
 /* The displayed image as 0x00RRGGBB, width × height words, top row first; valid until the next call on the renderer. */
 ES_API const uint32_t* es_renderer_display(es_renderer* renderer, uint32_t* width, uint32_t* height);
 

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "gi/bounce_pass.h"
+#include "gi/micro_view.h"
 #include "gi/renderer.h"
 #include "platform/context.h"
 #include "platform/maths.h"
@@ -11,7 +12,7 @@
 typedef enum image_kind {
     IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
-    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE
+    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
@@ -41,6 +42,9 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_LIGHT_NORMAL, "light-normal", "normal in the first light's G-buffer"},
     {IMAGE_IMPORTANCE, "importance", "where the first light's virtual point lights go (Knecht eq. 4.3)"},
     {IMAGE_ISM, "ism", "the first 64 shadow maps of the virtual point lights, 0 near, 1 far or empty"},
+    {IMAGE_MICRO, "micro-buffer", "of the pixel in the middle: its lobe's where it has one"},
+    {IMAGE_MICRO_UNWARPED, "micro-buffer-unwarped", "the same laid out over the hemisphere, the normal in the middle"},
+    {IMAGE_MICRO_DISTANCE, "micro-buffer-distance", "how far away is what the micro-buffer shows, metres; 0 where nothing is"},
 };
 enum { IMAGE_COUNT = sizeof images / sizeof images[0] };
 
@@ -253,6 +257,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         if (strcmp(images[i].name, name) == 0 || (images[i].kind == IMAGE_BOUNCE && bounce_of(name))) index = i;
     if (index < 0) return unknown_image(renderer, name);
     image_kind kind = images[index].kind;
+    if (kind >= IMAGE_MICRO) return es_micro_image(renderer, kind != IMAGE_MICRO_UNWARPED, kind == IMAGE_MICRO_DISTANCE, image);
 
     const es_gbuffer* g = &renderer->gbuffer;
     const es_light_view* light = renderer->light_count ? &renderer->light_views[0] : NULL;

@@ -52,7 +52,7 @@ void es_micro_free(es_context* context, es_micro_buffers* micro)
 
 /* ---- points ------------------------------------------------------------------------------------------------------------------ */
 
-static es_micro_settings settings_of(const es_renderer_settings* s)
+es_micro_settings es_micro_settings_of(const es_renderer_settings* s)
 {
     return (es_micro_settings){.size = s->micro_size, .cut = s->micro_cut, .ray_cast = s->micro_ray_cast, .warp = s->micro_warp, .quantised = s->micro_nodes == ES_MICRO_QUANTISED};
 }
@@ -105,7 +105,7 @@ static es_result light_points(es_renderer* r, uint32_t bounces)
     es_result result = es_points_light_direct(r->context, &r->micro.forest, &direct);
     es_arena_reset(&r->arena);
     if (!result && bounces > 1) {
-        const es_radiosity_job radiosity = {.level = s->micro_level, .iterations = bounces - 1, .micro = settings_of(s), .seed = s->seed, .lobes = &r->micro.lobes};
+        const es_radiosity_job radiosity = {.level = s->micro_level, .iterations = bounces - 1, .micro = es_micro_settings_of(s), .seed = s->seed, .lobes = &r->micro.lobes};
         const es_photon_job photons = {.scene = &r->trace_scene, .photons = s->micro_photons, .bounces = bounces - 1, .seed = s->seed, .emission = s->micro_emission, .lobes = &r->micro.lobes};
         if (s->micro_light == ES_MICRO_LIGHT_VPLS) result = add_vpls(r, bounces - 1);
         if (s->micro_light == ES_MICRO_LIGHT_RADIOSITY) result = es_points_light_radiosity(r->context, &r->arena, &r->micro.forest, &radiosity, NULL);
@@ -174,11 +174,17 @@ static es_micro_pixels pixels_of(const es_renderer* r, uint32_t kind)
     return (es_micro_pixels){.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(r->micro.turn) + r->frame.settings.seed};
 }
 
+bool es_micro_point_of_frame(const es_renderer* renderer, uint32_t x, uint32_t y, uint32_t kind, es_gather_point* point)
+{
+    const es_micro_pixels pixels = pixels_of(renderer, kind);
+    return es_micro_pixel_point(&pixels, x, y, point);
+}
+
 static es_result gather(es_renderer* r, es_micro_pixels* pixels, es_planes* planes, uint64_t* gathered)
 {
     es_arena_reset(&r->arena);
     for (int k = 0; k < 3; k++) pixels->result[k] = planes->at[k];
-    const es_micro_settings settings = settings_of(&r->frame.settings);
+    const es_micro_settings settings = es_micro_settings_of(&r->frame.settings);
     return es_micro_gather_pixels(r->context, &r->arena, &r->micro.forest, &settings, pixels, &r->micro.stats, gathered);
 }
 

@@ -25,6 +25,9 @@ es_result es_pass_micro(es_renderer* renderer, const es_frame_inputs* in);
  * for it. With emission, what glows is seen by the first. */
 uint32_t es_micro_bounces(const es_renderer* renderer);
 es_result es_micro_first_bounces(es_renderer* renderer, uint32_t bounces, es_planes* indirect);
+es_micro_settings es_micro_settings_of(const es_renderer_settings* settings);
+/* Where the last frame gathers for a pixel, with every pixel gathered at; false where it does not. */
+bool es_micro_point_of_frame(const es_renderer* renderer, uint32_t x, uint32_t y, uint32_t kind, es_gather_point* point);
 void es_micro_free_planes(es_context* context, es_micro_buffers* micro);
 void es_micro_free(es_context* context, es_micro_buffers* micro);
 

@@ -233,18 +233,25 @@ static void sum_up(const es_micro_job* job, es_micro_scratch* s, uint32_t lane, 
     for (int k = 0; k < 3; k++) sums[k] = vf_sum(sum[k]);
 }
 
-static void keep_picture(const es_micro_job* job, es_micro_scratch* s, uint32_t lane)
+static void keep_picture(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t lane)
 {
     const es_micro_table* table = job->table;
+    const bool lobe = here->mapping != ES_MICRO_COSINE;
+    if (lobe) lobe_rays(table, here, lane, s);
     for (uint32_t y = 0; y < table->size; y++)
         for (uint32_t x = 0; x < table->size; x++) {
             const int32_t word = pixels_of(s, lane)[y * table->stride + x];
             es_micro_pixel* pixel = &job->picture[y * table->size + x];
             *pixel = (es_micro_pixel){.node = UINT32_MAX};
+            const uint32_t at = y * table->stride + x;
+            const float dx = lobe ? s->rays[0][at] : table->x[at], dy = lobe ? s->rays[1][at] : table->y[at], dz = lobe ? s->rays[2][at] : table->z[at];
+            for (int k = 0; k < 3; k++) pixel->direction[k] = here->t[k][lane] * dx + here->b[k][lane] * dy + here->a[k][lane] * dz;
             if (word == EMPTY) continue;
             const vi bits = vi_set1(((word >> 16) + DEPTH_BASE + 32768) << 13);
             const es_vec3 light = es_unpack_rgb9e5(s->cut.radiance[word & 0xffff]);
-            *pixel = (es_micro_pixel){s->cut.node[word & 0xffff], es_sqrt(vf_from_bits(bits)[0] / job->inverse_square), {light.x, light.y, light.z}};
+            pixel->node = s->cut.node[word & 0xffff];
+            pixel->distance = es_sqrt(vf_from_bits(bits)[0] / job->inverse_square);
+            pixel->radiance[0] = light.x, pixel->radiance[1] = light.y, pixel->radiance[2] = light.z;
         }
 }
 
@@ -334,7 +341,7 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
         sum_up(job, s, i, f90, &lobe, sums);
         for (int k = 0; k < 3; k++) job->result[k][index] = sums[k] * share * (mapping != ES_MICRO_COSINE ? here.total[k][i] : 3.14159265f * (1.0f - f90 * (0.04f + 0.96f * (b2 * b2 * b))));
     }
-    if (job->picture) keep_picture(job, s, count - 1);
+    if (job->picture) keep_picture(job, s, &here, count - 1);
     s->stats.samples += (uint64_t)count * table->size * table->size;
 }
 

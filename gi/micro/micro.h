@@ -39,6 +39,7 @@ typedef struct es_micro_pixel {
     uint32_t node;         /* place in the forest's nodes; UINT32_MAX: nothing is there */
     float distance;        /* metres, to 1/2048 of itself; 0 where nothing is */
     float radiance[3];     /* W/(m² sr) */
+    float direction[3];    /* world, unit: of its middle, also where nothing is */
 } es_micro_pixel;
 
 /* The micro-buffer of one point, settings->size² pixels in rows. */

@@ -74,6 +74,14 @@ static es_gather_point point_of(const es_micro_pixels* p, uint32_t x, uint32_t y
     return point;
 }
 
+bool es_micro_pixel_point(const es_micro_pixels* pixels, uint32_t x, uint32_t y, es_gather_point* point)
+{
+    es_surface s;
+    if (!surface_at(pixels, x, y, &s)) return false;
+    *point = point_of(pixels, x * pixels->spacing, y * pixels->spacing, &s);
+    return true;
+}
+
 static void make_points(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const pixel_loop* loop = user;

@@ -26,6 +26,9 @@ typedef struct es_micro_pixels {
 static inline uint32_t es_micro_sparse(uint32_t pixels, uint32_t spacing) { return (pixels + spacing - 1) / spacing; }
 static inline uint32_t es_micro_list_stride(uint32_t width) { return (width + 7) / 8; }
 
+/* What pixel (x, y) of the smaller image is as a gather point; false when it is none. */
+bool es_micro_pixel_point(const es_micro_pixels* pixels, uint32_t x, uint32_t y, es_gather_point* point);
+
 /* *stats and *gathered (points) are added to. */
 es_result es_micro_gather_pixels(es_context* context, es_arena* arena, const es_point_forest* forest, const es_micro_settings* settings, const es_micro_pixels* pixels, es_micro_stats* stats, uint64_t* gathered);
 
