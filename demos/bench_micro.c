@@ -83,7 +83,7 @@ bool micro_time(micro_bench* bench, es_world* world, const char* text, float dt,
 {
     enum { MOST = 32 };
     double frame[MOST], update[MOST], light[MOST], gather[MOST];
-    const uint32_t frames = bench->frames < MOST ? bench->frames : MOST;
+    uint32_t frames = bench->frames < MOST ? bench->frames : MOST;
     es_renderer_settings settings = es_default_renderer_settings();
     const error_setting both[] = {{.settings = "gi=micro"}, {.settings = text}};
     es_renderer* renderer = NULL;
@@ -93,7 +93,10 @@ bool micro_time(micro_bench* bench, es_world* world, const char* text, float dt,
     *times = (micro_times){NAN, NAN, NAN, NAN, 0, 0};
     if (!error_apply(bench->context, &both[0], &settings) || !error_apply(bench->context, &both[1], &settings)) return false;
     bool works = es_renderer_create(bench->context, &settings, &renderer) == ES_OK;
+    const double begun = demo_seconds();
     for (int i = -1; i < (int)frames && works; i++) {
+        if (i > 0 && demo_seconds() - begun > bench->seconds) frames = (uint32_t)i; /* enough */
+        if (i == (int)frames) break;
         works = es_world_step(world, dt) == ES_OK;
         const double start = demo_seconds();
         works = works && es_renderer_render(renderer, world) == ES_OK;
@@ -121,6 +124,7 @@ int bench_micro(const bench_options* options)
     bench->height = options->height ? options->height : options->quick ? 48 : 512;
     bench->exponent = options->quick ? 13 : 20;
     bench->frames = options->quick ? 2 : 5;
+    bench->seconds = options->quick ? 1 : 8;
     bench->truth_samples = options->samples ? options->samples : options->quick ? 4 : 256;
     bench->truth_seconds = options->quick ? 2 : 120;
     bench->report = (bench_report){.name = "micro", .title = "Micro-buffers",

@@ -175,7 +175,7 @@ bool micro_measure(micro_bench* bench, const micro_stage* stage, const char* tex
 {
     enum { MOST = 8 };
     double times[MOST];
-    const uint32_t frames = bench->frames < MOST ? bench->frames : MOST;
+    uint32_t frames = bench->frames < MOST ? bench->frames : MOST;
     es_renderer_settings settings = es_default_renderer_settings();
     const error_setting setting = {.settings = text};
     es_renderer* renderer = NULL;
@@ -186,7 +186,10 @@ bool micro_measure(micro_bench* bench, const micro_stage* stage, const char* tex
     settings.micro_emission = false; /* nor has the truth the light of what glows */
     if (!error_apply(bench->context, &setting, &settings)) return false;
     bool works = es_renderer_create(bench->context, &settings, &renderer) == ES_OK;
+    const double begun = demo_seconds();
     for (int i = -1; i < (int)frames && works; i++) {
+        if (i > 0 && demo_seconds() - begun > bench->seconds) frames = (uint32_t)i; /* enough */
+        if (i == (int)frames) break;
         const double start = demo_seconds();
         works = es_renderer_render(renderer, stage->world) == ES_OK;
         if (i >= 0) times[i] = (demo_seconds() - start) * 1000;

@@ -75,23 +75,23 @@ void player_micro_panel(player* p, int bottom)
 {
     ui* u = &p->ui;
     const es_renderer_settings* s = &p->session.settings;
-    const int side = 96 * u->scale, line = (FONT_HEIGHT + 2) * u->scale, width = 4 * (side + 4 * u->scale) + 12 * u->scale, height = 2 * (side + line + 2 * u->scale) + line + u->row + 12 * u->scale;
-    canvas_rect rect = {((int)p->canvas.width - width) / 2, bottom - height, width, height};
+    const int side = 64 * u->scale, line = (FONT_HEIGHT + 2) * u->scale, width = 4 * (side + 4 * u->scale) + 12 * u->scale, height = 2 * (side + line + 2 * u->scale) + line + u->row + 12 * u->scale;
+    canvas_rect rect = {(int)p->canvas.width - width, bottom - height, width, height};
     if (rect.x < 0) rect.x = 0;
-    if (!ui_panel_begin(u, "micro-buffers", rect, "Micro-buffers under the mouse")) p->show_micro = false;
+    if (!ui_panel_begin(u, "micro-buffers", rect, "Micro-buffers")) p->show_micro = false;
     const float fx = p->input.mouse_x / (float)(p->input.width ? p->input.width : 1), fy = p->input.mouse_y / (float)(p->input.height ? p->input.height : 1);
     const bool inside = fx >= 0 && fx < 1 && fy >= 0 && fy < 1;
     if (s->method != ES_GI_MICRO) {
-        text(p, UI_DIM, "there are none: gi is not micro (key G)");
+        text(p, UI_DIM, "gi is not micro (key G)");
     } else if (inside) {
         const uint32_t x = (uint32_t)(fx * (float)s->width), y = (uint32_t)(fy * (float)s->height);
-        char note[96];
-        snprintf(note, sizeof note, "pixel %u, %u: %u × %u; light, the same over the hemisphere; distance, the same", x, y, s->micro_size, s->micro_size);
+        char note[64];
+        snprintf(note, sizeof note, "pixel %u, %u: light, distance", x, y);
         text(p, UI_DIM, note);
         for (int lobe = 0; lobe < 2; lobe++) {
             micro_pictures pictures = {0};
             const bool some = take(p, x, y, lobe != 0, &pictures);
-            text(p, UI_TEXT, lobe ? some ? "of the lobe" : "no lobe" : some ? "of all directions, by the cosine" : "nothing that reflects in all directions");
+            text(p, UI_TEXT, lobe ? some ? "lobe" : "no lobe" : some ? "all directions" : "reflects nothing in all directions");
             if (some) row_of_pictures(p, &pictures, side);
             for (int k = 0; k < 2; k++) {
                 es_image_destroy(p->session.context, &pictures.radiance[k]);
