@@ -424,6 +424,31 @@ static void test_refused(void** state)
     close_stage(&s);
 }
 
+/* The most points there may be, and too little memory for them: refused in one line, and smaller ones go on. */
+static void test_too_many(void** state)
+{
+    (void)state;
+    stage s = {.settings = small_settings(1)};
+    es_context_desc desc = es_default_context_desc();
+    desc.threads = 1;
+    desc.memory_cap = 48u << 20;
+    assert_int_equal(es_context_create(&desc, &s.context), ES_OK);
+    assert_int_equal(es_world_create_scene(s.context, "cornell", NULL, &s.world), ES_OK);
+    assert_int_equal(es_renderer_create(s.context, &s.settings, &s.renderer), ES_OK);
+    render(&s);
+    const uint64_t hash = all_of(&s);
+    s.settings.micro_points = 8388608;
+    configure(&s);
+    assert_int_equal(es_renderer_render(s.renderer, s.world), ES_MEMORY_CAP);
+    s.settings.micro_points++;
+    assert_int_equal(es_renderer_configure(s.renderer, &s.settings), ES_SETTING_VALUE);
+    s.settings.micro_points = POINTS;
+    configure(&s);
+    render(&s);
+    assert_true(all_of(&s) == hash);
+    close_stage(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -435,6 +460,7 @@ int main(void)
         unit_test_without_races(test_bounces),
         unit_test_without_races(test_little),
         unit_test_without_races(test_refused),
+        unit_test_without_races(test_too_many),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

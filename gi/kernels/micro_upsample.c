@@ -60,7 +60,7 @@ VINL vf likeness(bool lobe, const place* p, const place* q, vf gx, vf gy, vf gz,
     t = vf_min(vf_abs(t), one);
     vf depth = one - t * t;
     vf turn = one - (p->nx * q->nx + p->ny * q->ny + p->nz * q->nz), limit = vf_set1(ES_MICRO_TURN);
-    if (lobe) limit = vf_clamp(vf_set1(2.0f) * p->alpha * p->alpha, vf_set1(ES_MICRO_LOBE_TURN), limit);
+    if (lobe) limit = vf_clamp(vf_set1(0.5f) * p->alpha * p->alpha, vf_set1(ES_MICRO_LOBE_TURN), limit);
     vf normal = vf_clamp(vf_set1(2.0f) - turn * (vf_set1(2.0f) / limit), zero, one), material;
     if (lobe) material = vf_and(vi_eq(p->model, q->model), one - vf_set1(4.0f) * vf_abs(p->alpha - q->alpha) / vf_max(vf_max(p->alpha, q->alpha), vf_set1(1e-3f)));
     else material = one - vf_set1(4.0f) * vf_abs(p->f90 - q->f90);
@@ -113,7 +113,7 @@ VINL void upsample_row(const es_micro_upsample_job* job, bool lobe, uint32_t y)
                         sum[k] = sum[k] + weight * value;
                     }
                 }
-            const vm enough = vm_ge(weights, vf_set1(ES_MICRO_WEIGHT));
+            const vm enough = vm_ge(weights, vf_set1(lobe ? ES_MICRO_LOBE_WEIGHT : ES_MICRO_WEIGHT));
             missing = vm_bits(wanted & ~enough);
             for (int k = 0; k < 3; k++) sum[k] = vf_and(wanted & enough, sum[k] / vf_select(enough, weights, one));
             if (lit) lit[x / ES_LIT_COLUMNS] = 1;

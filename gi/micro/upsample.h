@@ -3,10 +3,11 @@
  * A pixel takes from the four gathered ones around it, each with its bilinear weight times how much its surface is like the pixel's:
  *     depth      (1 - t²)², t the distance of the other from the pixel's tangent plane over ES_MICRO_PLANE widths of the spacing there: a plane is itself at
  *                any angle, and has no bands where it is seen along
- *     normal     1 while 1 - n n' is below half of a limit, falling to 0 at it: ES_MICRO_TURN for diffuse light; for lobes 2 alpha² (Phong: alpha² = 2 / (e + 2)),
- *                which is a turn by as much as the lobe is wide, and ES_MICRO_LOBE_TURN at least
+ *     normal     1 while 1 - n n' is below half of a limit, falling to 0 at it: ES_MICRO_TURN for diffuse light; for lobes alpha² / 2 (Phong: alpha² = 2 / (e + 2)),
+ *                which is a turn by alpha, and ES_MICRO_LOBE_TURN at least
  *     material   diffuse: 1 - 4 |F90 - F90'|, for what the interface lets through; lobes: of one model, 1 - 4 |alpha - alpha'| / max(alpha, alpha')
- * and one that has no light of the kind counts nothing. Where the weights come to less than ES_MICRO_WEIGHT the pixel is listed, and is to be gathered at.
+ * and one that has no light of the kind counts nothing. Where the weights come to less than ES_MICRO_WEIGHT, of lobes
+ * ES_MICRO_LOBE_WEIGHT, the pixel is listed, and is to be gathered at: a mirrored picture beyond its edge is worth less than irradiance.
  * What a lobe reflects is taken in relation to its reflectance R = F0 + (F90 - F0) (1 - NV)^5, Phong: F0, so that patterns of a metal stay sharp.
  *
  * A pixel that was gathered at keeps what was gathered, to the bit. */
@@ -20,7 +21,8 @@
 #define ES_MICRO_PLANE 1.0f
 #define ES_MICRO_TURN 0.2f
 #define ES_MICRO_LOBE_TURN 5e-4f
-#define ES_MICRO_WEIGHT 0.1f
+#define ES_MICRO_WEIGHT 0.25f
+#define ES_MICRO_LOBE_WEIGHT 0.5f
 
 typedef struct es_micro_upsample_job {
     const es_gbuffer* gbuffer;     /* depth, both normals, albedo, surface */
