@@ -406,6 +406,25 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     check(context, es_renderer_configure(renderer, &settings), "bounces by reflective maps");
     print_images(context, renderer, world, p->name, "reflective", folder);
 
+    settings.method = ES_GI_MICRO;
+    settings.bounces = 1;
+    settings.width = p->width / 2;
+    settings.height = p->height / 2;
+    settings.micro_size = 12;
+    settings.micro_points = 4096;
+    check(context, es_renderer_configure(renderer, &settings), "micro-buffers");
+    print_images(context, renderer, world, p->name, "micro", folder);
+    settings.micro_spacing = 4;
+    settings.micro_light = p->interleave % 2 ? ES_MICRO_LIGHT_RADIOSITY : p->glossy ? ES_MICRO_LIGHT_PHOTONS : ES_MICRO_LIGHT_VPLS;
+    settings.micro_level = 8;
+    settings.micro_photons = 4096;
+    settings.bounces = 3;
+    settings.temporal = true;
+    check(context, es_renderer_configure(renderer, &settings), "fewer micro-buffers");
+    check(context, es_renderer_render(renderer, world), "rendering");
+    check(context, es_world_step(world, 1.0f / 30), "a step");
+    print_images(context, renderer, world, p->name, "micro-sparse", folder);
+
     es_renderer_destroy(renderer);
     es_world_destroy(world);
     free(made);
