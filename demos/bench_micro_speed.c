@@ -38,6 +38,7 @@ static bool measure_rates(micro_bench* bench, const char* scene, const char* end
         snprintf(settings, sizeof settings, "micro.points=%u micro.spacing=%d", 1u << bench->exponent, k ? 4 : 1);
         works = micro_time(bench, world, settings, dt, still, &times);
         if (works) set_rate(row, &times);
+        if (works) fprintf(stderr, "%s, %s: %.4g ms\n", scene, settings, times.frame);
     }
     es_world_destroy(world);
     return works;

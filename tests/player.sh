@@ -173,11 +173,11 @@ if play cornell --size 640x480 "${small[@]}"; then
     shot
     checks=$((checks + 1))
     alike "$first" "$picture" || fail 'a paused scene changes'
-    key m o t h # every panel
+    key m o t h ctrl+m # every panel
     shot
     checks=$((checks + 1))
     alike "$first" "$picture" || fail 'panels are in the picture'
-    key h t m Escape
+    key ctrl+m h t m Escape
     line=$(settings)
     checks=$((checks + 1))
     has '--set vpl.count=64' "$line" || fail "the settings lack what was given: $line"

@@ -18,7 +18,7 @@ static const es_scene scenes[] = {
     {"cornell-stack", "a stack of cubes in a Cornell box, a ball that brings it down, a lamp that sways (3,372 triangles)", es_scene_cornell_stack, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
     {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature, SETTINGS(STEADY, "vpl.count=512", "ism.points=2048", "vpl.light-size=64", "shadow.size=192", "shadow.filter=3", "exposure=0.9")},
     {"curtain", "a curtain in a doorway opens and closes the light of a room", es_scene_curtain, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "vpl.bound=40", "exposure=0.7")},
-    {"gallery", "a museum's hall of glossy and diffuse things about a turning dragon (626,304 triangles)", es_scene_gallery, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096")},
+    {"gallery", "a museum's hall of glossy and diffuse things about a turning dragon (626,304 triangles)", es_scene_gallery, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "micro.points=1048576", "micro.spacing=4")},
     {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "filter.depth=0.1", "shadow.size=512", "vpl.light-size=128")},
     {"maze", "a torch carried round a maze lights the chamber in its middle by three bounces (12,720 triangles)", es_scene_maze, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "bounces=3", "exposure=1.5", "filter.depth=0.1", "shadow.size=512", "vpl.light-size=128")},
     {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096")},
