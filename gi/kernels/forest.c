@@ -218,7 +218,8 @@ VINL void merge_cones(const v3 axis1, vf s1, const v3 axis2, vf s2, v3* axis, vf
     const vf ss = k1 * c2 + c1 * k2, cs = c1 * c2 - k1 * k2, s = st * cs + ct * ss, c = ct * cs - st * ss;
     const vm first = vm_le(s21, vf_zero()) & vm_gt(c21, vf_zero()), second = vm_le(s12, vf_zero()) & vm_gt(c12, vf_zero());
     const vf half = s / vf_sqrt(vf_max(two + two * c, vf_set1(1e-6f)));
-    const vm wide = any | (vm_le(s, vf_zero()) & vm_lt(c, vf_zero())) | vm_lt(c, vf_set1(-0.99f));
+    /* 180° and more: the sine is no longer positive, and from 270° on the axes are more than 90° apart */
+    const vm wide = any | (vm_le(s, vf_zero()) & (vm_lt(c, vf_zero()) | vm_lt(ct, vf_zero()))) | vm_lt(c, vf_set1(-0.99f));
     /* the turn's sine and cosine */
     const vf root = vf_sqrt(vf_max(two + two * c21, vf_set1(1e-6f))), st_turn = s21 / root, ct_turn = vf_set1(0.5f) * root;
     const vf share = st_turn / vf_max(st, vf_set1(1e-12f));

@@ -359,42 +359,36 @@ static void put_in_order(es_context* context, const es_split_point* points, cons
     es_parallel_for(context, count, 16384, order_some, &o);
 }
 
-typedef struct resting { const es_placing* placing; es_split_point* points; } resting;
-
-static void rest_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
-{
-    const resting* r = user;
-    for (uint32_t i = begin; i < end; i++) {
-        es_point_rest_position(r->placing->mesh, r->placing->shape, r->placing->triangle[i], r->placing->barycentric[i], r->points[i].position);
-        r->points[i].index = i;
-    }
-}
+/* Candidates for each point. A tree of more points than MOST_CHOSEN takes what is spread over the triangles: memory and time would be many times the tree's own. */
+enum { CHOICE = 4, MOST_CHOSEN = 1 << 20 };
 
 /* Places a tree's points and splits them. */
 static es_result build(es_context* context, es_point_forest* forest, uint32_t index, const es_forest_source* source)
 {
     const es_point_tree* tree = &forest->trees[index];
-    const uint32_t count = tree->leaf_count;
-    const size_t before_bytes = ((size_t)source->mesh->triangle_count + 1) * sizeof(double), words_bytes = 5 * (size_t)count * sizeof(uint32_t);
+    const es_leaf_shapes* shapes = &forest->own->shapes;
+    const uint32_t count = tree->leaf_count, choice = count > MOST_CHOSEN ? 1 : CHOICE;
+    const size_t leaf = tree->first_leaf, before_bytes = ((size_t)source->mesh->triangle_count + 1) * sizeof(double), candidates = (size_t)count * choice;
     double* before = es_allocate(context, before_bytes);
-    uint32_t* words = before ? es_allocate(context, words_bytes) : NULL;
-    es_split_point* points = words ? es_allocate_array(context, count, sizeof *points) : NULL;
+    es_split_point* points = before ? es_allocate_array(context, candidates, sizeof *points) : NULL;
     if (points) {
         es_point_areas(context, source->mesh, source->pose.shape, before);
-        float* shapes = (float*)(words + 2 * (size_t)count);
-        const es_placing placing = {source->mesh, source->pose.shape, before, count, words, words + count, {shapes, shapes + count, shapes + 2 * (size_t)count}};
-        es_point_place(context, &placing);
-        resting r = {&placing, points};
-        es_parallel_for(context, count, 4096, rest_some, &r);
-        es_tree_split(context, points, count);
-        struct es_forest_private* own = forest->own;
-        void* const to[5] = {forest->triangle, forest->barycentric, own->shapes.along, own->shapes.across, own->shapes.shear};
-        for (int k = 0; k < 5; k++) put_in_order(context, points, words + (size_t)k * count, (uint32_t*)to[k] + tree->first_leaf, count);
+        const es_placing placing = {source->mesh, source->pose.shape, before, count, choice, forest->triangle + leaf, forest->barycentric + leaf, {shapes->along + leaf, shapes->across + leaf, shapes->shear + leaf}};
+        es_point_candidates(context, &placing, points);
+        es_tree_split(context, points, count * choice, choice);
+        es_point_choose(context, &placing, points);
     }
-    es_release(context, points, count * sizeof *points);
-    es_release(context, words, words_bytes);
+    es_release(context, points, candidates * sizeof *points);
     es_release(context, before, before_bytes);
     return points ? ES_OK : es_context_last_result(context);
+}
+
+/* A back's points are its front's, the tree before. */
+static void copy_front(es_point_forest* forest, uint32_t index)
+{
+    const es_leaf_shapes* shapes = &forest->own->shapes;
+    void* const arrays[5] = {forest->triangle, forest->barycentric, shapes->along, shapes->across, shapes->shear};
+    for (int k = 0; k < 5; k++) copy_words(arrays[k], forest->trees[index].first_leaf, arrays[k], forest->trees[index - 1].first_leaf, forest->trees[index].leaf_count, 4);
 }
 
 /* Splits a tree as its leaves stand now; what they have goes with them. */
@@ -407,7 +401,7 @@ static es_result rebuild(es_context* context, es_point_forest* forest, uint32_t 
     if (scratch) {
         const size_t node = tree->first + count, leaf = tree->first_leaf;
         es_forest_stand(context, forest, index, points);
-        es_tree_split(context, points, count);
+        es_tree_split(context, points, count, 1);
         const es_leaf_shapes* shapes = &forest->own->shapes;
         void* const arrays[13] = {forest->albedo_rg + leaf, forest->albedo_b + leaf, forest->surface + leaf, forest->triangle + leaf, forest->barycentric + leaf, shapes->along + leaf,
             shapes->across + leaf, shapes->shear + leaf, forest->albedo + node, forest->emission + node, forest->radiance[0] + node, forest->radiance[1] + node, forest->radiance[2] + node};
@@ -425,23 +419,37 @@ static es_result rebuild(es_context* context, es_point_forest* forest, uint32_t 
 
 typedef struct reading { es_point_forest* forest; const es_draw_list* list; uint32_t tree; } reading;
 
+/* The same everywhere on the mesh? */
+static bool is_plain(const es_raster_mesh* mesh, const es_material_desc* m)
+{
+    return !mesh->colors && !m->base_color_texture.image && !m->metallic_roughness_texture.image && !m->specular_texture.image && !m->emission_texture.image;
+}
+
 static void read_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const reading* r = user;
     es_point_forest* f = r->forest;
     const es_point_tree* tree = &f->trees[r->tree];
     const es_raster_instance* instance = &r->list->instances[tree->instance];
+    const es_raster_mesh* mesh = instance->mesh;
     const es_material_desc* material = &r->list->materials[instance->material];
+    const bool plain = is_plain(mesh, material);
+    es_surfel_words words = {0};
+    uint32_t albedo = 0, emission = 0;
     for (uint32_t k = begin; k < end; k++) {
         const size_t leaf = tree->first_leaf + k, node = tree->first + tree->leaf_count + k;
-        const es_surfel_words words = es_surfel_read(instance->mesh, material, f->triangle[leaf], f->barycentric[leaf]);
+        if (k == begin || !plain) {
+            words = es_surfel_read(mesh, material, f->triangle[leaf], f->barycentric[leaf]);
+            const es_surface surface = es_surface_of_gbuffer(words.albedo_rg, words.albedo_b, words.surface);
+            albedo = es_pack_rgb9e5(es_v3(es_minf(surface.albedo.x + surface.specular.x, 1.0f), es_minf(surface.albedo.y + surface.specular.y, 1.0f),
+                es_minf(surface.albedo.z + surface.specular.z, 1.0f)));
+            emission = words.hole ? 0 : es_pack_rgb9e5(es_surfel_emission(mesh, material, f->triangle[leaf], f->barycentric[leaf]));
+        }
         f->albedo_rg[leaf] = words.albedo_rg;
         f->albedo_b[leaf] = words.albedo_b;
         f->surface[leaf] = words.surface;
-        const es_surface surface = es_surface_of_gbuffer(words.albedo_rg, words.albedo_b, words.surface);
-        f->albedo[node] = es_pack_rgb9e5(es_v3(es_minf(surface.albedo.x + surface.specular.x, 1.0f), es_minf(surface.albedo.y + surface.specular.y, 1.0f),
-            es_minf(surface.albedo.z + surface.specular.z, 1.0f)));
-        f->emission[node] = words.hole ? 0 : es_pack_rgb9e5(es_surfel_emission(instance->mesh, material, f->triangle[leaf], f->barycentric[leaf]));
+        f->albedo[node] = albedo;
+        f->emission[node] = emission;
         float* along = &f->own->shapes.along[leaf];
         *along = words.hole ? -es_maxf(es_absf(*along), 1e-30f) : es_absf(*along);
     }
@@ -529,7 +537,9 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
         bool read;
         const bool place = compare(tree, state, source, &list->instances[state->source], own->materials != materials, &read);
         if (place) {
-            result = build(context, forest, i, source);
+            const bool front = tree->back && i && forest->trees[i - 1].instance == tree->instance && forest->trees[i - 1].leaf_count == tree->leaf_count && own->states[i - 1].base < 0.0;
+            if (front) copy_front(forest, i);
+            else result = build(context, forest, i, source);
             if (result) return result;
             state->base = -1.0;
             for (int c = 0; c < 3; c++) memset(forest->radiance[c] + tree->first, 0, 2 * (size_t)tree->leaf_count * sizeof(float));

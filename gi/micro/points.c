@@ -140,69 +140,108 @@ double es_point_areas(es_context* context, const es_raster_mesh* mesh, const flo
     return sum;
 }
 
-void es_point_rest_position(const es_raster_mesh* mesh, const float shape[9], uint32_t triangle, uint32_t barycentric, float position[3])
-{
-    double a[3], u[3], v[3];
-    corners(mesh, shape, triangle, a, u, v);
-    const double s = (double)(barycentric & 0xffff) / 65535.0, t = (double)(barycentric >> 16) / 65535.0;
-    for (int k = 0; k < 3; k++) position[k] = (float)(a[k] + s * u[k] + t * v[k]);
-}
-
 /* ---- places --------------------------------------------------------------------------------------------------------------------- */
 
-static void place(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+/* Candidates, in the order of the triangles' areas: candidate k stands at k + 1/2 along the sequence of all areas; what is left of that place within a triangle and the
+ * fraction of k times the golden ratio are mapped to the triangle, keeping areas (Heitz 2019, "A low-distortion map between triangle and square"). So
+ * they are a lattice on each large triangle, and one in each equal share of area on small ones. */
+typedef struct places { const es_raster_mesh* mesh; const float* shape; const double* before; double scale; } places;
+
+static places places_of(const es_placing* p, uint32_t candidates)
 {
-    const es_placing* p = user;
-    const uint32_t triangles = p->mesh->triangle_count;
-    const double scale = p->before[triangles] / p->count;
-    uint32_t low = 0, high = triangles; /* the triangle of the first, by halving */
+    return (places){p->mesh, p->shape, p->before, p->before[p->mesh->triangle_count] / candidates};
+}
+
+static uint32_t triangle_of(const places* p, uint32_t k)
+{
+    const double where = (k + 0.5) * p->scale;
+    uint32_t low = 0, high = p->mesh->triangle_count;
     while (high - low > 1) {
         const uint32_t middle = low + (high - low) / 2;
-        if (p->before[middle] <= (begin + 0.5) * scale) low = middle;
+        if (p->before[middle] <= where) low = middle;
         else high = middle;
     }
-    uint32_t t = low;
+    return low;
+}
+
+static uint32_t barycentric_of(const places* p, uint32_t k, uint32_t t)
+{
+    const double share = p->before[t + 1] - p->before[t];
+    float u = es_clampf(share > 0.0 ? (float)(((k + 0.5) * p->scale - p->before[t]) / share) : 0.5f, 0.0f, 1.0f), v = es_unit_float(k * 2654435769u);
+    if (v > u) {
+        u *= 0.5f;
+        v -= u;
+    } else {
+        v *= 0.5f;
+        u -= v;
+    }
+    return (uint32_t)(u * 65535.0f + 0.5f) | (uint32_t)(v * 65535.0f + 0.5f) << 16;
+}
+
+typedef struct spreading { places places; es_split_point* points; } spreading;
+
+static void spread(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const spreading* job = user;
+    const places* p = &job->places;
+    const uint32_t triangles = p->mesh->triangle_count;
+    uint32_t t = triangle_of(p, begin), last = UINT32_MAX;
+    double a[3] = {0}, u[3] = {0}, v[3] = {0};
     for (uint32_t k = begin; k < end; k++) {
-        const double where = (k + 0.5) * scale;
-        while (t + 1 < triangles && p->before[t + 1] <= where) t++;
-        const double share = p->before[t + 1] - p->before[t];
-        /* areas are kept (Heitz 2019, "A low-distortion map between triangle and square") */
-        float u = es_clampf(share > 0.0 ? (float)((where - p->before[t]) / share) : 0.5f, 0.0f, 1.0f);
-        float v = es_unit_float(k * 2654435769u);
-        if (v > u) {
-            u *= 0.5f;
-            v -= u;
-        } else {
-            v *= 0.5f;
-            u -= v;
+        while (t + 1 < triangles && p->before[t + 1] <= (k + 0.5) * p->scale) t++;
+        if (t != last) corners(p->mesh, p->shape, t, a, u, v);
+        last = t;
+        const uint32_t barycentric = barycentric_of(p, k, t);
+        const double s = (double)(barycentric & 0xffff) / 65535.0, r = (double)(barycentric >> 16) / 65535.0;
+        for (int c = 0; c < 3; c++) job->points[k].position[c] = (float)(a[c] + s * u[c] + r * v[c]);
+        job->points[k].index = k;
+    }
+}
+
+void es_point_candidates(es_context* context, const es_placing* placing, es_split_point* candidates)
+{
+    const uint32_t count = placing->count * placing->choice;
+    spreading job = {places_of(placing, count), candidates};
+    es_parallel_for(context, count, 8192, spread, &job);
+}
+
+typedef struct choosing { const es_placing* placing; places places; const es_split_point* points; double radius; } choosing;
+
+static void choose(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const choosing* job = user;
+    const es_placing* p = job->placing;
+    for (uint32_t i = begin; i < end; i++) {
+        const es_split_point* group = job->points + (size_t)i * p->choice;
+        float middle[3] = {0, 0, 0}, least = 0.0f;
+        uint32_t best = 0;
+        for (uint32_t j = 0; j < p->choice; j++)
+            for (int c = 0; c < 3; c++) middle[c] += group[j].position[c];
+        for (uint32_t j = 0; j < p->choice; j++) {
+            float square = 0.0f;
+            for (int c = 0; c < 3; c++) {
+                const float way = group[j].position[c] - middle[c] / (float)p->choice;
+                square += way * way;
+            }
+            if (j && !(square < least || (square == least && group[j].index < group[best].index))) continue;
+            least = square;
+            best = j;
         }
-        p->triangle[k] = t;
-        p->barycentric[k] = (uint32_t)(u * 65535.0f + 0.5f) | (uint32_t)(v * 65535.0f + 0.5f) << 16;
-    }
-}
-
-static void shape_discs(void* user, uint32_t begin, uint32_t end, uint32_t worker)
-{
-    const es_placing* p = user;
-    const double radius = (double)ES_POINT_OVERLAP * root(p->before[p->mesh->triangle_count] / p->count / 3.14159265358979);
-    double a[3], u[3], v[3];
-    for (uint32_t k = begin; k < end; k++) {
-        corners(p->mesh, p->shape, p->triangle[k], a, u, v);
+        const uint32_t k = group[best].index, t = triangle_of(&job->places, k);
+        double a[3], u[3], v[3];
+        corners(p->mesh, p->shape, t, a, u, v);
         const double length = root(dot(u, u)), height = length > 0.0 ? 2.0 * area_of(u, v) / length : 0.0;
-        p->shapes.along[k] = length > 1e-9 * radius ? (float)(radius / length) : 0.0f;
-        p->shapes.across[k] = height > 1e-9 * radius ? (float)(radius / height) : 0.0f;
-        p->shapes.shear[k] = length > 0.0 ? es_clampf((float)(dot(u, v) / (length * length)), -ES_POINT_FARTHEST, ES_POINT_FARTHEST) : 0.0f;
+        p->triangle[i] = t;
+        p->barycentric[i] = barycentric_of(&job->places, k, t);
+        p->shapes.along[i] = length > 1e-9 * job->radius ? (float)(job->radius / length) : 0.0f;
+        p->shapes.across[i] = height > 1e-9 * job->radius ? (float)(job->radius / height) : 0.0f;
+        p->shapes.shear[i] = length > 0.0 ? es_clampf((float)(dot(u, v) / (length * length)), -ES_POINT_FARTHEST, ES_POINT_FARTHEST) : 0.0f;
     }
 }
 
-void es_point_place(es_context* context, const es_placing* placing)
+void es_point_choose(es_context* context, const es_placing* placing, const es_split_point* candidates)
 {
-    es_placing p = *placing;
-    if (!context) {
-        place(&p, 0, p.count, 0);
-        shape_discs(&p, 0, p.count, 0);
-        return;
-    }
-    es_parallel_for(context, p.count, 4096, place, &p);
-    es_parallel_for(context, p.count, 4096, shape_discs, &p);
+    const double area = placing->before[placing->mesh->triangle_count];
+    choosing job = {placing, places_of(placing, placing->count * placing->choice), candidates, (double)ES_POINT_OVERLAP * root(area / placing->count / 3.14159265358979)};
+    es_parallel_for(context, placing->count, 4096, choose, &job);
 }
