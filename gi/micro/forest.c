@@ -359,15 +359,16 @@ static void put_in_order(es_context* context, const es_split_point* points, cons
     es_parallel_for(context, count, 16384, order_some, &o);
 }
 
-/* Candidates for each point. A tree of more points than MOST_CHOSEN takes what is spread over the triangles: memory and time would be many times the tree's own. */
-enum { CHOICE = 4, MOST_CHOSEN = 1 << 20 };
+/* Candidates for each point. Where triangles have many points each, candidates are a lattice, which no choice makes more even; a tree of more points than MOST_CHOSEN
+ * takes them as they are, too: memory and time would be many times the tree's own. */
+enum { CHOICE = 4, MOST_CHOSEN = 1 << 20, LATTICE = 8 };
 
 /* Places a tree's points and splits them. */
 static es_result build(es_context* context, es_point_forest* forest, uint32_t index, const es_forest_source* source)
 {
     const es_point_tree* tree = &forest->trees[index];
     const es_leaf_shapes* shapes = &forest->own->shapes;
-    const uint32_t count = tree->leaf_count, choice = count > MOST_CHOSEN ? 1 : CHOICE;
+    const uint32_t count = tree->leaf_count, choice = count > MOST_CHOSEN || count / LATTICE >= source->mesh->triangle_count ? 1 : CHOICE;
     const size_t leaf = tree->first_leaf, before_bytes = ((size_t)source->mesh->triangle_count + 1) * sizeof(double), candidates = (size_t)count * choice;
     double* before = es_allocate(context, before_bytes);
     es_split_point* points = before ? es_allocate_array(context, candidates, sizeof *points) : NULL;
@@ -523,9 +524,9 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
         shares[2 * i + 1] = (share){.mass = list->materials[list->instances[i].material].double_sided ? shares[2 * i].mass : 0.0};
     }
     share_out(shares, 2 * list->instance_count, request->points);
-    bool changed = false;
+    bool changed = false, light = false;
     if (!same_trees(forest, sources, shares, list, !request->packed_only)) {
-        changed = true;
+        changed = light = true;
         result = lay_out(context, forest, sources, shares, list, !request->packed_only);
         if (result) return result;
     }
@@ -580,7 +581,7 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
         result = rebuild(context, forest, i);
         if (result) return result;
         state->base = -1.0;
-        again = true;
+        again = light = true;
         count->built++;
     }
     if (again) {
@@ -592,6 +593,7 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
     if (!order) return es_context_last_result(context);
     es_forest_refit_top(context, forest, order);
     es_release(context, order, ((size_t)forest->tree_count + 1) * sizeof *order);
+    if (light) es_forest_pull(context, forest); /* what was kept, where it is now */
     forest->version = es_context_next_serial(context);
     return ES_OK;
 }

@@ -54,8 +54,8 @@ typedef struct es_node_looks {
     const float* area;
 } es_node_looks;
 
-/* A disc's radius over that of the circle of the area it stands for. Discs leave less than 0.15 % of a surface bare (tests/test_point_forest.c); none, if they were
- * 1.95 times as wide as the circles, and reached as much further past edges. */
+/* A disc's radius over that of the circle of the area it stands for. On triangles with many points discs leave nothing bare, on smaller ones a thousandth of
+ * the surface at most (tests/test_point_forest.c). */
 #define ES_POINT_OVERLAP 1.6f
 /* How much longer than wide a stretched disc may count: beyond, what is stretched leaves holes instead of growing out of its surface. */
 #define ES_POINT_STRETCH 4.0f
