@@ -15,9 +15,9 @@
 #include "tests/races.h"
 
 #if defined(__SANITIZE_THREAD__)
-enum { WIDTH = 22, HEIGHT = 14, POINTS = 256 };
+enum { WIDTH = 22, HEIGHT = 14, POINTS = 256, VARIANTS = 1 };
 #else
-enum { WIDTH = 42, HEIGHT = 30, POINTS = 1024 };
+enum { WIDTH = 42, HEIGHT = 30, POINTS = 1024, VARIANTS = 4 };
 #endif
 
 typedef struct stage { es_context* context; es_world* world; es_renderer* renderer; es_renderer_settings settings; } stage;
@@ -151,8 +151,8 @@ static void test_same_bits(void** state)
 {
     (void)state;
     static const struct { const char* scene; uint32_t spacing; bool temporal; uint32_t antialias; } variants[] = {
-        {"cornell", 1, false, ES_ANTIALIAS_NONE}, {"room", 4, true, ES_ANTIALIAS_NONE}, {"cornell", 2, false, ES_ANTIALIAS_TEMPORAL}, {"cornell", 4, false, ES_ANTIALIAS_SUPERSAMPLE}};
-    for (size_t v = 0; v < sizeof variants / sizeof *variants; v++) {
+        {"room", 4, true, ES_ANTIALIAS_NONE}, {"cornell", 1, false, ES_ANTIALIAS_NONE}, {"cornell", 2, false, ES_ANTIALIAS_TEMPORAL}, {"cornell", 4, false, ES_ANTIALIAS_SUPERSAMPLE}};
+    for (size_t v = 0; v < VARIANTS; v++) {
         const uint32_t spacing = variants[v].spacing, antialias = variants[v].antialias;
         const bool temporal = variants[v].temporal;
         uint64_t expected[FRAMES], other[FRAMES];
@@ -160,10 +160,11 @@ static void test_same_bits(void** state)
         run(variants[v].scene, 2, 0, false, spacing, temporal, antialias, other);
         for (int i = 0; i < FRAMES; i++)
             if (expected[i] != other[i]) fail_msg("variant %zu: frame %d differs without skipping and on two threads", v, i);
+        for (int i = 8; i < 12; i++) assert_true(expected[i] != expected[i - 1]);
+        if (v) continue; /* kernels are the same in all of them */
         run(variants[v].scene, 1, 1u << ES_ISA_SCALAR, true, spacing, temporal, antialias, other);
         for (int i = 0; i < FRAMES; i++)
             if (expected[i] != other[i]) fail_msg("variant %zu: frame %d differs with the scalar kernels", v, i);
-        for (int i = 8; i < 12; i++) assert_true(expected[i] != expected[i - 1]);
     }
 }
 
@@ -270,7 +271,7 @@ static void test_settles(void** state)
     (void)state;
     es_renderer_settings settings = small_settings(1);
     settings.temporal = true;
-    settings.temporal_settle = 16;
+    settings.temporal_settle = 9;
     stage s = open_stage("cornell", 1, 0, &settings), moved = open_stage("cornell", 1, 0, &settings);
     render(&s);
     es_image single = image_of(&s, "irradiance");
@@ -296,7 +297,7 @@ static void test_settles(void** state)
     for (uint32_t i = 0; i < settings.temporal_settle + 2; i++) render(&moved);
     es_image other_settled = image_of(&moved, "irradiance");
     const double alone = difference(&single, &other), mean = difference(&settled, &other_settled);
-    if (!(alone > 0.01 && mean < 0.35 * alone)) fail_msg("frames of two seeds differ by %.4f, settled ones by %.4f", alone, mean); /* 1/4, were they independent */
+    if (!(alone > 0.01 && mean < 0.45 * alone)) fail_msg("frames of two seeds differ by %.4f, settled ones by %.4f", alone, mean); /* 1/3, were they independent */
     es_image_destroy(s.context, &single);
     es_image_destroy(s.context, &settled);
     es_image_destroy(s.context, &other);
