@@ -145,6 +145,7 @@ typedef struct es_renderer_settings {
     uint32_t micro_spacing;          /* 1, 2, 4: light is gathered at every so manieth pixel of every so manieth row, and interpolated along surfaces, what
                                       * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
     float micro_cut;                 /* a node is drawn when its solid angle is at most this share of a pixel's */
+    float micro_cover;               /* it is drawn where a disc of so many times its area covers the pixel's middle: 1 covers as much as there is, with gaps, which are closed */
     bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
     bool micro_warp;                 /* a pixel is a direction of the lobe's importance; off: of the cosine's, weighted by the lobe */
     uint32_t micro_nodes;            /* es_micro_nodes */

@@ -21,8 +21,8 @@
 #define NEAREST 7e-18f
 #define FARTHEST 63.0f
 #define EMPTY INT32_MAX
-/* Points whose common cut has more nodes are too far from each other to share it. */
-enum { LARGE_CUT = 12000, LARGE_NEAR = 1500 };
+/* Radii within which a disc is taken for the surface that it lies on, when it faces the same way. */
+#define OWN_SURFACE 2.0f
 
 VINL vi depth_of(vf square, float inverse_square)
 {
@@ -40,7 +40,7 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
     const es_micro_table* table = job->table;
     const es_micro_cut* cut = &s->cut;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
-    vf across[RUN], along[RUN], up[RUN];
+    vf across[RUN], along[RUN], up[RUN], area[RUN];
     int32_t at[RUN][VW], key[RUN][VW];
     for (uint32_t begin = first; begin < end; begin += RUN) {
         const uint32_t count = end - begin < RUN ? end - begin : RUN;
@@ -49,10 +49,12 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
             const vf dx = vf_set1(cut->c[0][i]) - here->p[0], dy = vf_set1(cut->c[1][i]) - here->p[1], dz = vf_set1(cut->c[2][i]) - here->p[2];
             const vf d2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(1e-30f)), d = vf_sqrt(d2), inverse = one / d;
             const vf facing = vf_set1(cut->slab[i]) - (vf_set1(cut->axis[0][i]) * dx + vf_set1(cut->axis[1][i]) * dy + vf_set1(cut->axis[2][i]) * dz) + d * vf_set1(cut->sine[i]);
-            const vm seen = vm_gt(here->n[0] * dx + here->n[1] * dy + here->n[2] * dz, d * vf_set1(GRAZING)) & vm_gt(facing, zero);
+            const vf z = here->n[0] * dx + here->n[1] * dy + here->n[2] * dz;
+            const vm seen = vm_gt(z, d * vf_set1(GRAZING)) & vm_gt(facing, zero);
             across[j] = (here->t[0] * dx + here->t[1] * dy + here->t[2] * dz) * inverse;
             along[j] = (here->b[0] * dx + here->b[1] * dy + here->b[2] * dz) * inverse;
-            if (lobe) up[j] = (here->a[0] * dx + here->a[1] * dy + here->a[2] * dz) * inverse;
+            up[j] = (lobe ? here->a[0] * dx + here->a[1] * dy + here->a[2] * dz : z) * inverse;
+            area[j] = vf_set1(job->settings.cover * cut->spread[i]) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one) * (inverse * inverse);
             vi_store(key[j], vi_select(seen, depth_of(d2, job->inverse_square) | vi_set1((int32_t)i), vi_set1(EMPTY)));
         }
         for (uint32_t j = 0; j < count; j++) {
@@ -61,8 +63,14 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
                 vi_store(at[j], lobe_pixel(table, here, s, across[j], along[j], up[j]));
                 continue;
             }
-            square_of(across[j], along[j], vf_sqrt(across[j] * across[j] + along[j] * along[j]), &u, &v);
-            vi_store(at[j], pixel_at(table, u, v));
+            const vf rho = vf_sqrt(across[j] * across[j] + along[j] * along[j]);
+            square_of(across[j], along[j], rho, &u, &v);
+            vf off_across, off_along;
+            vi_store(at[j], pixel_of(table, u, v, &off_across, &off_along));
+            /* is the pixel's middle within the node's area, seen as a disc? Otherwise all that is seen would grow by half a pixel, and at the horizon, where pixels
+             * are high, what is low would hide what is above it */
+            const vf z2 = up[j] * up[j] + vf_set1(0.25f) * area[j];
+            vi_store(key[j], vi_select(vm_le(off_across + off_along * z2, area[j] * z2), vi_load(key[j]), vi_set1(EMPTY)));
         }
         for (uint32_t j = 0; j < count; j++)
             for (int k = 0; k < VW; k++) {
@@ -169,7 +177,9 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
         const vf dx = vf_set1(cut->c[0][i]) - here->p[0], dy = vf_set1(cut->c[1][i]) - here->p[1], dz = vf_set1(cut->c[2][i]) - here->p[2], r = vf_set1(cut->r[i]);
         const vf d2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(1e-30f)), z = here->n[0] * dx + here->n[1] * dy + here->n[2] * dz;
         const vf facing = vf_neg(vf_set1(cut->axis[0][i]) * dx + vf_set1(cut->axis[1][i]) * dy + vf_set1(cut->axis[2][i]) * dz) - vf_sqrt(d2) * vf_set1(GRAZING);
-        const vm seen = vm_gt(z + r, vf_zero()) & vm_gt(facing, vf_zero());
+        /* a disc that the point all but lies on, and that faces as it does, stands for the point's own surface, which bends less than the disc is wide */
+        const vf alike = vf_max(here->n[0] * vf_set1(cut->axis[0][i]) + here->n[1] * vf_set1(cut->axis[1][i]) + here->n[2] * vf_set1(cut->axis[2][i]), vf_zero()), own = vf_set1(OWN_SURFACE) * alike * r;
+        const vm seen = vm_gt(z + r, vf_zero()) & vm_gt(facing, vf_zero()) & vm_ge(d2, own * own);
         vf measure = r * r;
         if (lobe) {
             const vf inverse = vf_set1(1.0f) / vf_sqrt(d2), x = (here->t[0] * dx + here->t[1] * dy + here->t[2] * dz) * inverse, up = (here->a[0] * dx + here->a[1] * dy + here->a[2] * dz) * inverse;
@@ -350,7 +360,7 @@ void ES_KERNEL(es_gi_micro_gather)(const es_micro_job* job, uint32_t first, uint
     const es_micro_mapping mapping = es_micro_mapping_of(&job->points[job->order[first]], &job->settings);
     const cell world = bound(job, first, count, mapping);
     float open = job->settings.cut / (float)(job->table->size * job->table->size);
-    while (!find_cut(job, &world, open, s) || ((s->cut.count > LARGE_CUT || ES_MICRO_MAX_CUT - s->cut.near > LARGE_NEAR) && count > VW)) {
+    while (!find_cut(job, &world, open, count > VW, s)) {
         if (count > 1) {
             const uint32_t half = count > VW ? (count / 2 + VW - 1) / VW * VW : count / 2;
             ES_KERNEL(es_gi_micro_gather)(job, first, half, s);

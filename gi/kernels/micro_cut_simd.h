@@ -117,14 +117,15 @@ typedef struct finder {
     es_micro_scratch* s;
     cell here;
     float open;            /* cut / size² */
+    uint32_t most, most_near; /* nodes beyond which the cell had better be divided */
     bool full;
 } finder;
 
 /* To the world: small nodes from the cut's beginning on, leaves that are near from its end. */
-VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, uint32_t bits, bool near)
+VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, float spread, uint32_t bits, bool near)
 {
     es_micro_cut* cut = &f->s->cut;
-    if (cut->near - cut->count < VW) {
+    if (cut->near - cut->count < VW || cut->count > f->most || ES_MICRO_MAX_CUT - cut->near > f->most_near) {
         f->full = true;
         return;
     }
@@ -148,6 +149,7 @@ VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, 
         cut->slab[at] = columns[6][i];
         cut->sine[at] = columns[7][i];
         cut->r[at] = columns[8][i];
+        cut->spread[at] = spread;
         cut->radiance[at] = (uint32_t)words[0][i];
         cut->node[at] = (uint32_t)words[1][i];
     }
@@ -161,7 +163,9 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
     const es_point_node_float* floats = forest->float_nodes + tree->first;
     uint32_t *wave = f->s->wave[0], *next = f->s->wave[1], count = 1;
     wave[0] = 1;
-    while (count && !f->full) {
+    /* all nodes of a level have as many leaves, and leaves of a tree have one size */
+    float spread = forest->area[tree->first + 1] * 0.318309886f;
+    for (; count && !f->full; spread *= 0.5f) {
         uint32_t opened_count = 0;
         for (uint32_t i = count; i < (count + 7) / 8 * 8; i++) wave[i] = 1;
         const bool leaves = wave[0] >= tree->leaf_count; /* all of a level are of one kind */
@@ -172,7 +176,7 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
             const vm seen = classify(&f->here, &v, f->open, &opened) & vm_first((int32_t)(count - i));
             const uint32_t kept = vm_bits(seen & ~opened);
             uint32_t down = vm_bits(seen & opened);
-            if (kept) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), kept, false);
+            if (kept) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), spread, kept, false);
             if (!leaves) {
                 if (opened_count + 2 * VW > 2 * ES_MICRO_MAX_CUT - VW) {
                     f->full = true;
@@ -182,6 +186,8 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
                     const uint32_t node = wave[i + (uint32_t)__builtin_ctz(down)];
                     next[opened_count++] = 2 * node;
                     next[opened_count++] = 2 * node + 1;
+                    if (quantised) __builtin_prefetch(packed + 2 * (size_t)node);
+                    else __builtin_prefetch(floats + 2 * (size_t)node);
                 }
             } else if (trees) {
                 for (; down; down &= down - 1) {
@@ -189,7 +195,7 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
                     if (index != UINT32_MAX) trees[(*tree_count)++] = index;
                 }
             } else if (down) {
-                keep(f, tree, &v, at + vi_set1((int32_t)tree->first), down, true);
+                keep(f, tree, &v, at + vi_set1((int32_t)tree->first), spread, down, true);
             }
         }
         uint32_t* swapped = wave;
@@ -262,11 +268,14 @@ static cell turned(const es_point_tree* tree, const cell* world)
     return here;
 }
 
-/* False: there is no room for it. */
-static bool find_cut(const es_micro_job* job, const cell* world, float open, es_micro_scratch* s)
+/* Points whose common cut has more nodes are too far from each other to share it. */
+enum { LARGE_CUT = 12000, LARGE_NEAR = 1500 };
+
+/* False: there is no room for it, or it is too large for the cell to be worth while (`divisible`). */
+static bool find_cut(const es_micro_job* job, const cell* world, float open, bool divisible, es_micro_scratch* s)
 {
     const es_point_forest* forest = job->forest;
-    finder f = {.job = job, .s = s, .here = *world, .open = open};
+    finder f = {.job = job, .s = s, .here = *world, .open = open, .most = divisible ? LARGE_CUT : ES_MICRO_MAX_CUT, .most_near = divisible ? LARGE_NEAR : ES_MICRO_MAX_CUT};
     uint32_t trees = 0;
     s->cut.count = 0;
     s->cut.near = ES_MICRO_MAX_CUT;

@@ -56,6 +56,19 @@ VINL vi pixel_at(const es_micro_table* table, vf u, vf v)
     return vi_truncate(vf_floor(v * scale + half) * vf_set1((float)table->stride) + (u * scale + half));
 }
 
+/* The same, and the squared distances of the pixel's middle: across the rings that the map makes of circles, and along them on the disc, both over the disc's
+ * radius. */
+VINL vi pixel_of(const es_micro_table* table, vf u, vf v, vf* across, vf* along)
+{
+    const float size = (float)table->size;
+    const vf half = vf_set1(0.5f * size), scale = vf_set1(0.4999998f * size), x = u * scale + half, y = v * scale + half, column = vf_floor(x), row = vf_floor(y);
+    const vf dx = x - column - vf_set1(0.5f), dy = y - row - vf_set1(0.5f), x2 = dx * dx, y2 = dy * dy;
+    const vm wide = vm_ge(vf_abs(u), vf_abs(v));
+    *across = vf_select(wide, x2, y2) * vf_set1(4.0f / (size * size));
+    *along = vf_select(wide, y2, x2) * vf_set1(4.0f * 0.61685028f / (size * size));
+    return vi_truncate(row * vf_set1((float)table->stride) + column);
+}
+
 /* ---- lobes: between directions in the axes and the disc ---------------------------------------------------------------------------- */
 
 /* Stretched to a hemisphere, the normal h turns the view v to c, and visible normals are those with which c is uniform over the cap z > -v_z (Dupuy and Benyoub

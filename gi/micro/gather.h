@@ -71,6 +71,7 @@ typedef struct es_micro_cut {
     float slab[ES_MICRO_MAX_CUT + 8];      /* metres */
     float sine[ES_MICRO_MAX_CUT + 8];      /* of the cone's half angle, less what is too grazing to matter */
     float r[ES_MICRO_MAX_CUT + 8];
+    float spread[ES_MICRO_MAX_CUT + 8];    /* square of the radius of a disc of the node's area, m² */
     uint32_t radiance[ES_MICRO_MAX_CUT + 8]; /* RGB9E5; [65535] is 0 */
     uint32_t node[ES_MICRO_MAX_CUT + 8];   /* place in the forest's nodes */
     uint32_t count;                        /* nodes that no point of the cell opens: [0, count) */

@@ -27,6 +27,7 @@ typedef struct es_gather_point {
 typedef struct es_micro_settings {
     uint32_t size;         /* of the micro-buffers, pixels a side, 8 … 32, a multiple of 8 or 4 */
     float cut;             /* a node is drawn when its solid angle is no more than this share of the pixel's it falls on */
+    float cover;           /* nodes are drawn where a disc of so many times their area, turned as they are, covers the pixel's middle; gaps are closed */
     bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn into one pixel */
     bool warp;             /* pixels are distributed as the lobe is; off: as the cosine, and weighted */
     bool quantised;        /* nodes of 128 bits; off: floats */
