@@ -55,7 +55,7 @@ static const es_setting renderer_table[] = {
     {"micro.size", ES_SETTING_INT, "24", 8, 32, NULL, "pixels of a micro-buffer's side, a multiple of 4", AT(micro_size)},
     {"micro.points", ES_SETTING_INT, "1048576", 1, 8388608, NULL, "points that stand for the scene, at most", AT(micro_points)},
     {"micro.spacing", ES_SETTING_INT, "1", 1, 4, NULL, "light is gathered at every pixel, or every 2nd or 4th in each dimension: 1, 2 or 4", AT(micro_spacing)},
-    {"micro.cut", ES_SETTING_FLOAT, "8", 0.01, 100, NULL, "largest solid angle of a node that is drawn, share of its pixel's", AT(micro_cut)},
+    {"micro.cut", ES_SETTING_FLOAT, "4", 0.01, 100, NULL, "largest solid angle of a node that is drawn, share of its pixel's", AT(micro_cut)},
     {"micro.cover", ES_SETTING_FLOAT, "1.3", 0.1, 100, NULL, "a node covers the pixels' middles within so many times its area", AT(micro_cover)},
     {"micro.ray-cast", ES_SETTING_BOOL, "true", 0, 1, NULL, "points larger than a pixel are met by rays", AT(micro_ray_cast)},
     {"micro.warp", ES_SETTING_BOOL, "true", 0, 1, NULL, "a micro-buffer's pixels are distributed as the lobe is", AT(micro_warp)},

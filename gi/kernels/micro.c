@@ -66,8 +66,8 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
             const vf rho = vf_sqrt(across[j] * across[j] + along[j] * along[j]);
             square_of(across[j], along[j], rho, &u, &v);
             vf off_across, off_along;
-            vi_store(at[j], pixel_of(table, u, v, &off_across, &off_along));
-            /* is the pixel's middle within the node's area, seen as a disc? Otherwise all that is seen would grow by half a pixel, and at the horizon, where pixels
+            vi_store(at[j], pixel_of(table, here, u, v, &off_across, &off_along));
+            /* is the pixel's ray within the node's area, seen as a disc? Otherwise all that is seen would grow by half a pixel, and at the horizon, where pixels
              * are high, what is low would hide what is above it */
             const vf z2 = up[j] * up[j] + vf_set1(0.25f) * area[j];
             vi_store(key[j], vi_select(vm_le(off_across + off_along * z2, area[j] * z2), vi_load(key[j]), vi_set1(EMPTY)));
@@ -104,7 +104,7 @@ VINL void cast_chunk(const disc* d, vf dx, vf dy, vf dz, float inverse_square, i
 
 /* Its projection is no further from its centre's than its radius over its distance, on the disc; on the square no further than 1.63 of that (the map's steepest
  * slope: 4/pi along the circle and 1 across). */
-static void cast_cosine(const es_micro_job* job, const disc* d, float r, int32_t* pixels)
+static void cast_cosine(const es_micro_job* job, const es_micro_rays* rays, const disc* d, float r, int32_t* pixels)
 {
     const es_micro_table* table = job->table;
     const uint32_t size = table->size;
@@ -114,7 +114,7 @@ static void cast_cosine(const es_micro_job* job, const disc* d, float r, int32_t
         const float inverse = 1.0f / es_sqrt(d2), a = c[0] * inverse, b = c[1] * inverse, reach = 1.63f * 1.1f * r * inverse, half = 0.5f * (float)size;
         vf u, v;
         square_of(vf_set1(a), vf_set1(b), vf_set1(es_sqrt(a * a + b * b)), &u, &v);
-        const float left = (u[0] - reach + 1.0f) * half - 0.5f, right = (u[0] + reach + 1.0f) * half - 0.5f, up = (v[0] - reach + 1.0f) * half - 0.5f, down = (v[0] + reach + 1.0f) * half - 0.5f;
+        const float x = u[0] * half + half - 0.5f - rays->shift[0], y = v[0] * half + half - 0.5f - rays->shift[1], wide = reach * half, left = x - wide, right = x + wide, up = y - wide, down = y + wide;
         x0 = left > 0.0f ? (uint32_t)left / VW : 0;
         y0 = up > 0.0f ? (uint32_t)(up + 0.999f) : 0;
         x1 = right < (float)(size - 1) ? (uint32_t)es_maxf(right, 0.0f) / VW : x1;
@@ -123,7 +123,7 @@ static void cast_cosine(const es_micro_job* job, const disc* d, float r, int32_t
     for (uint32_t y = y0; y <= y1; y++)
         for (uint32_t x = x0; x <= x1; x++) {
             const uint32_t at = y * table->stride + x * VW;
-            cast_chunk(d, vf_load(table->x + at), vf_load(table->y + at), vf_load(table->z + at), job->inverse_square, pixels + at);
+            cast_chunk(d, vf_load(rays->x + at), vf_load(rays->y + at), vf_load(rays->z + at), job->inverse_square, pixels + at);
         }
 }
 
@@ -168,7 +168,7 @@ static disc disc_in_axes(const es_micro_cut* cut, const lanes* here, uint32_t la
     return disc;
 }
 
-static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes* here, float open, uint32_t bits)
+static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes* here, const uint32_t jitters[VW], float open, uint32_t bits)
 {
     const es_micro_cut* cut = &s->cut;
     const bool lobe = here->mapping != ES_MICRO_COSINE;
@@ -199,7 +199,7 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
             if (!(s->cast[i] >> lane & 1)) continue;
             const disc disc = disc_in_axes(cut, here, lane, i);
             if (lobe) cast_lobe(job, s, &disc, cut->r[i], pixels_of(s, lane));
-            else cast_cosine(job, &disc, cut->r[i], pixels_of(s, lane));
+            else cast_cosine(job, &job->table->rays[jitters[lane]], &disc, cut->r[i], pixels_of(s, lane));
         }
     }
 }
@@ -221,7 +221,7 @@ VINL vi without_gaps(const int32_t* pixels, uint32_t stride)
 /* Weights of pixels, in place of the sum's own where a lobe's are not distributed as it is. */
 typedef struct unwarped { bool is; es_surface_v surface; vf view[3]; } unwarped;
 
-static void sum_up(const es_micro_job* job, es_micro_scratch* s, uint32_t lane, float f90, const unwarped* lobe, float sums[3])
+static void sum_up(const es_micro_job* job, es_micro_scratch* s, const es_micro_rays* rays, uint32_t lane, float f90, const unwarped* lobe, float sums[3])
 {
     const es_micro_table* table = job->table;
     const int32_t* pixels = pixels_of(s, lane);
@@ -233,17 +233,17 @@ static void sum_up(const es_micro_job* job, es_micro_scratch* s, uint32_t lane, 
         if (lobe->is) {
             vf pass, weight[3];
             const vf zero = vf_zero();
-            es_surface_parts_v(&lobe->surface, zero, zero, vf_set1(1.0f), vf_load(table->x + at), vf_load(table->y + at), vf_load(table->z + at), lobe->view[0], lobe->view[1], lobe->view[2], &pass, weight);
+            es_surface_parts_v(&lobe->surface, zero, zero, vf_set1(1.0f), vf_load(rays->x + at), vf_load(rays->y + at), vf_load(rays->z + at), lobe->view[0], lobe->view[1], lobe->view[2], &pass, weight);
             for (int k = 0; k < 3; k++) sum[k] = sum[k] + light[k] * weight[k];
         } else {
-            const vf share = vf_set1(1.0f) - vf_set1(f90) * vf_load(table->interface + at);
+            const vf share = vf_set1(1.0f) - vf_set1(f90) * vf_load(rays->interface + at);
             for (int k = 0; k < 3; k++) sum[k] = sum[k] + light[k] * share;
         }
     }
     for (int k = 0; k < 3; k++) sums[k] = vf_sum(sum[k]);
 }
 
-static void keep_picture(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t lane)
+static void keep_picture(const es_micro_job* job, es_micro_scratch* s, const es_micro_rays* rays, const lanes* here, uint32_t lane)
 {
     const es_micro_table* table = job->table;
     const bool lobe = here->mapping != ES_MICRO_COSINE;
@@ -254,7 +254,7 @@ static void keep_picture(const es_micro_job* job, es_micro_scratch* s, const lan
             es_micro_pixel* pixel = &job->picture[y * table->size + x];
             *pixel = (es_micro_pixel){.node = UINT32_MAX};
             const uint32_t at = y * table->stride + x;
-            const float dx = lobe ? s->rays[0][at] : table->x[at], dy = lobe ? s->rays[1][at] : table->y[at], dz = lobe ? s->rays[2][at] : table->z[at];
+            const float dx = lobe ? s->rays[0][at] : rays->x[at], dy = lobe ? s->rays[1][at] : rays->y[at], dz = lobe ? s->rays[2][at] : rays->z[at];
             for (int k = 0; k < 3; k++) pixel->direction[k] = here->t[k][lane] * dx + here->b[k][lane] * dy + here->a[k][lane] * dz;
             if (word == EMPTY) continue;
             const vi bits = vi_set1(((word >> 16) + DEPTH_BASE + 32768) << 13);
@@ -339,19 +339,24 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
     for (uint32_t i = 0; i < VW; i++)
         for (uint32_t k = 0; k < words; k += VW) vi_store(s->words[i] + k, vi_set1(EMPTY));
     lanes here = lanes_of(job, first, count, mapping);
+    uint32_t jitters[VW];
+    for (uint32_t i = 0; i < VW; i++) {
+        jitters[i] = es_micro_jitter(&job->points[job->order[first + (i < count ? i : 0)]]);
+        for (int k = 0; k < 2; k++) here.shift[k][i] = table->rays[jitters[i]].shift[k];
+    }
     if (mapping != ES_MICRO_COSINE) tabulate_lobe(table, &here, s);
     draw_small(job, s, &here, 0, s->cut.count);
-    draw_near(job, s, &here, open, count < VW ? (1u << count) - 1 : 0xffu);
+    draw_near(job, s, &here, jitters, open, count < VW ? (1u << count) - 1 : 0xffu);
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t index = job->order[first + i];
         const es_gather_point* point = &job->points[index];
         const unwarped lobe = mapping == ES_MICRO_COSINE ? unwarped_of(point, &here, i) : (unwarped){.is = false};
         const float f90 = point->kind == ES_GATHER_LOBE ? 0.0f : here.f90[i], nv = es_micro_view_cosine(point), b = 1.0f - nv, b2 = b * b, share = 1.0f / (float)(table->size * table->size);
         float sums[3];
-        sum_up(job, s, i, f90, &lobe, sums);
+        sum_up(job, s, &table->rays[jitters[i]], i, f90, &lobe, sums);
         for (int k = 0; k < 3; k++) job->result[k][index] = sums[k] * share * (mapping != ES_MICRO_COSINE ? here.total[k][i] : 3.14159265f * (1.0f - f90 * (0.04f + 0.96f * (b2 * b2 * b))));
     }
-    if (job->picture) keep_picture(job, s, &here, count - 1);
+    if (job->picture) keep_picture(job, s, &table->rays[jitters[count - 1]], &here, count - 1);
     s->stats.samples += (uint64_t)count * table->size * table->size;
 }
 

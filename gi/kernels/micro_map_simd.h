@@ -23,6 +23,7 @@ typedef struct lanes {
     es_micro_mapping mapping;
     vf p[3], n[3], t[3], b[3], a[3];
     vf turn_cosine, turn_sine;          /* of the disc; for the cosine t and b are turned */
+    vf shift[2];                        /* of the rays from the pixels' middles, pixels */
     vf alpha, alpha2, view_x, view_z, bent_x, bent_z; /* GGX: the view in the axes, y 0; the same stretched */
     vf bound, cap;                      /* k and 1 + k v_z, below */
     vf exponent, normal_t, normal_b, normal_a;        /* Phong: the normal in the axes */
@@ -56,12 +57,13 @@ VINL vi pixel_at(const es_micro_table* table, vf u, vf v)
     return vi_truncate(vf_floor(v * scale + half) * vf_set1((float)table->stride) + (u * scale + half));
 }
 
-/* The same, and the squared distances of the pixel's middle: across the rings that the map makes of circles, and along them on the disc, both over the disc's
+/* The pixel whose ray is nearest, and the squared distances from it: across the rings that the map makes of circles, and along them on the disc, both over the disc's
  * radius. */
-VINL vi pixel_of(const es_micro_table* table, vf u, vf v, vf* across, vf* along)
+VINL vi pixel_of(const es_micro_table* table, const lanes* l, vf u, vf v, vf* across, vf* along)
 {
     const float size = (float)table->size;
-    const vf half = vf_set1(0.5f * size), scale = vf_set1(0.4999998f * size), x = u * scale + half, y = v * scale + half, column = vf_floor(x), row = vf_floor(y);
+    const vf half = vf_set1(0.5f * size), scale = vf_set1(0.4999998f * size), x = u * scale + half - l->shift[0], y = v * scale + half - l->shift[1];
+    const vf last = vf_set1(size - 1.0f), column = vf_min(vf_max(vf_floor(x), vf_zero()), last), row = vf_min(vf_max(vf_floor(y), vf_zero()), last);
     const vf dx = x - column - vf_set1(0.5f), dy = y - row - vf_set1(0.5f), x2 = dx * dx, y2 = dy * dy;
     const vm wide = vm_ge(vf_abs(u), vf_abs(v));
     *across = vf_select(wide, x2, y2) * vf_set1(4.0f / (size * size));
@@ -240,11 +242,11 @@ static void lobe_rays(const es_micro_table* table, const lanes* l, uint32_t lane
     const uint32_t size = table->size;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
     for (uint32_t column = 0; column < size; column++) {
-        const float u = table_place(&s->marginal[0][lane], ((float)column + 0.5f) / (float)size);
+        const float u = table_place(&s->marginal[0][lane], ((float)column + 0.5f + l->shift[0][lane]) / (float)size);
         const uint32_t cell = (uint32_t)es_clampf((u + 1.0f) * (0.5f * ES_MICRO_GRID), 0.0f, ES_MICRO_GRID - 1);
         for (uint32_t row = 0; row < size; row++) {
             s->rays[0][row * table->stride + column] = u;
-            s->rays[1][row * table->stride + column] = table_place(&s->conditional[cell][0][lane], ((float)row + 0.5f) / (float)size);
+            s->rays[1][row * table->stride + column] = table_place(&s->conditional[cell][0][lane], ((float)row + 0.5f + l->shift[1][lane]) / (float)size);
         }
         for (uint32_t pad = size; column + 1 == size && pad < table->stride; pad++)
             for (uint32_t row = 0; row < size; row++) s->rays[0][row * table->stride + pad] = u, s->rays[1][row * table->stride + pad] = s->rays[1][row * table->stride + column];

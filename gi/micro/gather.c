@@ -23,14 +23,19 @@ static float middle(uint32_t i, uint32_t count) { return ((float)i + 0.5f) * (2.
 static void fill_table(uint32_t size, es_micro_table* table)
 {
     *table = (es_micro_table){.size = size, .stride = es_micro_stride(size)};
-    for (uint32_t row = 0; row < size; row++)
-        for (uint32_t column = 0; column < size; column++) {
-            const uint32_t at = row * table->stride + column;
-            disc_of(middle(column, size), middle(row, size), &table->x[at], &table->y[at]);
-            table->z[at] = es_sqrt(es_maxf(1.0f - table->x[at] * table->x[at] - table->y[at] * table->y[at], 0.0f));
-            const float a = 1.0f - table->z[at], a2 = a * a;
-            table->interface[at] = 0.04f + 0.96f * (a2 * a2 * a);
-        }
+    for (uint32_t j = 0; j < ES_MICRO_JITTERS; j++) {
+        es_micro_rays* rays = &table->rays[j];
+        /* multiples of the two irrational steps of Roberts (2018) */
+        for (int k = 0; k < 2; k++) rays->shift[k] = (float)((j + 1) * (k ? 2447445414u : 3242174889u) >> 8) * (0.96f / 16777216.0f) - 0.48f;
+        for (uint32_t row = 0; row < size; row++)
+            for (uint32_t column = 0; column < size; column++) {
+                const uint32_t at = row * table->stride + column;
+                disc_of(middle(column, size) + rays->shift[0] * (2.0f / (float)size), middle(row, size) + rays->shift[1] * (2.0f / (float)size), &rays->x[at], &rays->y[at]);
+                rays->z[at] = es_sqrt(es_maxf(1.0f - rays->x[at] * rays->x[at] - rays->y[at] * rays->y[at], 0.0f));
+                const float a = 1.0f - rays->z[at], a2 = a * a;
+                rays->interface[at] = 0.04f + 0.96f * (a2 * a2 * a);
+            }
+    }
     for (uint32_t i = 0; i < ES_MICRO_GRID; i++)
         for (uint32_t j = 0; j < ES_MICRO_GRID; j++) {
             const uint32_t at = i * ES_MICRO_GRID + j, last = ES_MICRO_GRID - 1, side = i == 0 || j == 0 || i == last || j == last ? 2 : 1;

@@ -12,6 +12,7 @@ enum {
     ES_MICRO_PIXELS = ES_MICRO_MAX_SIZE * ES_MICRO_MAX_SIZE,
     ES_MICRO_MARGIN = ES_MICRO_MAX_SIZE + 8, /* empty words before and behind a buffer */
     ES_MICRO_LANE = ES_MICRO_PIXELS + 2 * ES_MICRO_MARGIN, /* from one buffer to the next: not a multiple of what would put all into the same sets of a cache */
+    ES_MICRO_JITTERS = 8,         /* sets of places in the pixels */
     ES_MICRO_GRID = 16,           /* cells a side of what a lobe's density is tabulated on */
     ES_MICRO_MAX_CUT = 65528      /* nodes of a cut: their places take 16 bits, the last one is the empty pixel's */
 };
@@ -44,15 +45,23 @@ static inline es_vec3 es_micro_mirror(const es_gather_point* point)
     return es_v3_normalize(es_v3_sub(es_v3_scale(n, 2.0f * es_v3_dot(n, v)), v), n);
 }
 
-/* What all cosine-distributed buffers of a size have in common: the pixels' middles, about z. */
-typedef struct es_micro_table {
-    uint32_t size, stride;
+/* What all cosine-distributed buffers of a size have in common: rays, about z, through one place in each pixel. A point has one of some sets: with one alone the
+ * rings of all would lie at the same heights, and what lies low show as bands. */
+typedef struct es_micro_rays {
+    float shift[2];                     /* of the places from the pixels' middles, pixels */
     float x[ES_MICRO_PIXELS], y[ES_MICRO_PIXELS], z[ES_MICRO_PIXELS];
     float interface[ES_MICRO_PIXELS];   /* 0.04 + 0.96 (1 - z)^5: what an interface with F90 = 1 does not let through */
+} es_micro_rays;
+
+typedef struct es_micro_table {
+    uint32_t size, stride;
+    es_micro_rays rays[ES_MICRO_JITTERS];
     /* On the disc, of the cells of the grid that a lobe's density is tabulated on: column i, row j at 16 i + j. The middle; at the border, where the density falls to
      * 0 as a root does, the middles of the quarters. */
     struct { float x[4], y[4]; uint32_t count; } grid[ES_MICRO_GRID * ES_MICRO_GRID];
 } es_micro_table;
+
+static inline uint32_t es_micro_jitter(const es_gather_point* point) { return (point->seed * 2654435769u >> 5) % ES_MICRO_JITTERS; }
 
 typedef struct es_micro_job {
     const es_point_forest* forest;
