@@ -56,7 +56,7 @@ static const es_setting renderer_table[] = {
     {"micro.points", ES_SETTING_INT, "1048576", 1, 8388608, NULL, "points that stand for the scene, at most", AT(micro_points)},
     {"micro.spacing", ES_SETTING_INT, "1", 1, 4, NULL, "light is gathered at every pixel, or every 2nd or 4th in each dimension: 1, 2 or 4", AT(micro_spacing)},
     {"micro.cut", ES_SETTING_FLOAT, "4", 0.01, 100, NULL, "largest solid angle of a node that is drawn, share of its pixel's", AT(micro_cut)},
-    {"micro.cover", ES_SETTING_FLOAT, "1.3", 0.1, 100, NULL, "a node covers the pixels' middles within so many times its area", AT(micro_cover)},
+    {"micro.cover", ES_SETTING_FLOAT, "1.6", 0.1, 100, NULL, "a node covers the pixels' middles within so many times its area", AT(micro_cover)},
     {"micro.ray-cast", ES_SETTING_BOOL, "true", 0, 1, NULL, "points larger than a pixel are met by rays", AT(micro_ray_cast)},
     {"micro.warp", ES_SETTING_BOOL, "true", 0, 1, NULL, "a micro-buffer's pixels are distributed as the lobe is", AT(micro_warp)},
     {"micro.nodes", ES_SETTING_CHOICE, "quantised", 0, 0, "quantised|float", "nodes of the point hierarchy: of 128 bits, or of floats", AT(micro_nodes)},

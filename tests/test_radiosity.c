@@ -57,7 +57,7 @@ static void add_box(small_world* w, const es_material_desc* material)
 
 static es_radiosity_job job_of(uint32_t iterations)
 {
-    return (es_radiosity_job){.level = LEVEL, .iterations = iterations, .micro = {.size = 16, .cut = 1, .cover = 1.3f, .ray_cast = true, .warp = true, .quantised = true}, .seed = 5, .lobes = &lobes};
+    return (es_radiosity_job){.level = LEVEL, .iterations = iterations, .micro = {.size = 16, .cut = 1, .cover = 2, .ray_cast = true, .warp = true, .quantised = true}, .seed = 5, .lobes = &lobes};
 }
 
 /* What glows, and nothing else. */

@@ -207,15 +207,19 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
 /* ---- sums --------------------------------------------------------------------------------------------------------------------------------- */
 
 /* A pixel that nothing fell on, between two that something fell on, is a gap between nodes: it shows what the one of these shows that is further away, as that is
- * seldom in front of anything. */
-VINL vi without_gaps(const int32_t* pixels, uint32_t stride)
+ * seldom in front of anything. Beyond the border is what is within. */
+VINL vi without_gaps(const es_micro_table* table, const int32_t* pixels, uint32_t column, uint32_t row)
 {
-    const vi own = vi_load(pixels), empty = vi_set1(EMPTY);
+    const uint32_t stride = table->stride, last = table->size - 1;
+    pixels += (size_t)row * stride + column;
+    const vi own = vi_load(pixels), empty = vi_set1(EMPTY), x = vi_iota() + vi_set1((int32_t)column);
     const vm gap = vi_eq(own, empty);
     if (!vm_any(gap)) return own;
-    const vi left = vi_load(pixels - 1), right = vi_load(pixels + 1), up = vi_load(pixels - stride), down = vi_load(pixels + stride);
+    vi left = vi_load(pixels - 1), right = vi_load(pixels + 1), up = vi_load(row ? pixels - stride : pixels + stride), down = vi_load(row < last ? pixels + stride : pixels - stride);
+    left = vi_select(vi_eq(x, vi_zero()), right, left);
+    right = vi_select(vi_eq(x, vi_set1((int32_t)last)), left, right);
     const vi across = vi_max(left, right), along = vi_max(up, down);
-    return vi_select(gap, vi_min(across, along), own);
+    return vi_select(gap & ~vi_gt(x, vi_set1((int32_t)last)), vi_min(across, along), own);
 }
 
 /* Weights of pixels, in place of the sum's own where a lobe's are not distributed as it is. */
@@ -227,7 +231,7 @@ static void sum_up(const es_micro_job* job, es_micro_scratch* s, const es_micro_
     const int32_t* pixels = pixels_of(s, lane);
     vf sum[3] = {vf_zero(), vf_zero(), vf_zero()};
     for (uint32_t at = 0; at < table->stride * table->size; at += VW) {
-        const vi word = vi_gather(s->cut.radiance, without_gaps(pixels + at, table->stride) & vi_set1(0xffff));
+        const vi word = vi_gather(s->cut.radiance, without_gaps(table, pixels, at % table->stride, at / table->stride) & vi_set1(0xffff));
         vf light[3];
         es_unpack_rgb9e5_v(word, &light[0], &light[1], &light[2]);
         if (lobe->is) {
