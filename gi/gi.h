@@ -146,6 +146,8 @@ typedef struct es_renderer_settings {
                                       * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
     float micro_cut;                 /* a node is drawn when its solid angle is at most this share of a pixel's */
     float micro_cover;               /* it is drawn where a disc of so many times its area covers the pixel's middle: 1 covers as much as there is, with gaps, which are closed */
+    uint32_t micro_filter;           /* with micro_spacing 1: diffuse light goes through the geometry-aware filter of that size, filter_passes times: its noise is that of
+                                      * places in pixels, and neighbours have others; 1: not */
     bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
     bool micro_warp;                 /* a pixel is a direction of the lobe's importance; off: of the cosine's, weighted by the lobe */
     uint32_t micro_nodes;            /* es_micro_nodes */

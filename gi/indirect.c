@@ -135,14 +135,19 @@ static const es_planes* shaded_specular(const es_renderer* r) { return blended_f
 
 /* ---- filter ------------------------------------------------------------------------------------------------------------------ */
 
+/* Lobes that micro-buffers gathered are left as sharp as they are. */
+static bool filters_specular(const es_renderer* r) { return r->has_specular && r->frame.settings.method != ES_GI_MICRO; }
+static uint32_t filter_size(const es_renderer_settings* s) { return s->method == ES_GI_MICRO ? s->micro_filter : s->interleave; }
+
 es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular)
 {
     const es_renderer_settings* s = &r->frame.settings;
     const es_gbuffer* shaded = es_indirect_gbuffer(r);
     es_result result = es_planes_resize(r->context, filtered_irradiance, shaded);
-    if (!result && r->has_specular) result = es_planes_resize(r->context, filtered_specular, shaded);
+    const bool lobes = filters_specular(r);
+    if (!result && lobes) result = es_planes_resize(r->context, filtered_specular, shaded);
     if (result) return result;
-    es_filter_job job = {.gbuffer = shaded, .size = s->interleave, .passes = r->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = r->has_specular ? 6 : 3,
+    es_filter_job job = {.gbuffer = shaded, .size = filter_size(s), .passes = r->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = lobes ? 6 : 3,
         .source_lit = specular->lit, .result_lit = filtered_specular->lit};
     for (int k = 0; k < 3; k++) {
         job.source[k] = irradiance->at[k];
@@ -159,7 +164,7 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const char* nothing = es_indirect_nothing(r, in);
-    const char* why = nothing ? nothing : s->method == ES_GI_MICRO ? "gi is micro: nothing is interleaved" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    const char* why = nothing ? nothing : s->method == ES_GI_MICRO && s->micro_spacing > 1 ? "micro.spacing is above 1: interpolation is smooth" : s->method == ES_GI_MICRO && s->micro_filter == 1 ? "micro.filter is 1" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->method != ES_GI_MICRO && s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
     r->filter_passes = why ? 0 : s->filter_passes;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_FILTER, why);
@@ -169,7 +174,7 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADING);
     if (blended_first(r)) es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
-    float numbers[] = {s->filter_depth, s->filter_normal, (float)s->interleave, r->has_specular, (float)s->filter_passes};
+    float numbers[] = {s->filter_depth, s->filter_normal, (float)filter_size(s), r->has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_FILTER)) return ES_OK;
     es_result result = es_indirect_filter(r, shaded_irradiance(r), shaded_specular(r), &r->filtered_irradiance, &r->filtered_specular);
@@ -179,7 +184,7 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
 }
 
 static const es_planes* filtered_irradiance(const es_renderer* r) { return r->filter_passes ? &r->filtered_irradiance : shaded_irradiance(r); }
-static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes ? &r->filtered_specular : shaded_specular(r); }
+static const es_planes* filtered_specular(const es_renderer* r) { return r->filter_passes && filters_specular(r) ? &r->filtered_specular : shaded_specular(r); }
 
 void es_indirect_unblended(const es_renderer* r, const es_planes** irradiance, const es_planes** specular)
 {

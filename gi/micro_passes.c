@@ -345,6 +345,7 @@ es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* in
     es_indirect_planes light;
     memset(&light, 0, sizeof light);
     const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
+    es_planes filtered = {0}, none = {0};
     if (bounces < es_micro_bounces(r)) {
         result = light_points(r, bounces);
         if (!result) result = gather_all(r, &light.irradiance, &light.specular);
@@ -356,6 +357,10 @@ es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* in
         irradiance = &light.irradiance;
         specular = &light.specular;
     }
+    if (!result && r->filter_passes) {
+        result = es_indirect_filter(r, irradiance, specular, &filtered, &none);
+        irradiance = &filtered;
+    }
     job.lit = specular->lit;
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = irradiance->at[k];
@@ -364,5 +369,6 @@ es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* in
     }
     if (!result) es_compose(r->context, &job);
     es_indirect_planes_free(r->context, &light);
+    es_planes_free(r->context, &filtered);
     return result;
 }
