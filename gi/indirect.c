@@ -172,7 +172,7 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
     }
     es_plan_begin(plan, ES_PASS_FILTER);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
-    es_plan_reads_pass(plan, ES_PASS_SHADING);
+    es_indirect_reads(plan);
     if (blended_first(r)) es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     float numbers[] = {s->filter_depth, s->filter_normal, (float)filter_size(s), r->has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
