@@ -253,12 +253,13 @@ static void test_structure(void** state)
 
 /* On a square of `side`² pairs of triangles, how far points are from each other and places from points, over the distance of a hexagonal lattice's and the radius of
  * the circle of a point's area: the least distance, the mean, and the share of places that no disc covers. */
+enum { SPACED = 16384 };
 typedef struct spacing { double least, mean, bare, farthest; } spacing;
 
 static spacing space_of(const float* x, const float* z, uint32_t count, float radius)
 {
     enum { CELLS = 64, PLACES = 20000 };
-    static uint32_t first[CELLS * CELLS], next[POINTS];
+    static uint32_t first[CELLS * CELLS], next[SPACED];
     for (int i = 0; i < CELLS * CELLS; i++) first[i] = UINT32_MAX;
     for (uint32_t i = 0; i < count; i++) {
         const int cell = (int)fminf(fmaxf((z[i] + 0.5f) * CELLS, 0), CELLS - 1) * CELLS + (int)fminf(fmaxf((x[i] + 0.5f) * CELLS, 0), CELLS - 1);
@@ -290,7 +291,7 @@ static spacing space_of(const float* x, const float* z, uint32_t count, float ra
 
 static void test_blue_noise(void** state)
 {
-    enum { COUNT = POINTS < 16384 ? POINTS : 16384 };
+    enum { COUNT = SPACED };
     es_context* context = new_context(1, 0);
     scene* s = new_scene();
     bend(s, 0, 2);

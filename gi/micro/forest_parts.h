@@ -1,4 +1,4 @@
-/* Between the files of the hierarchy of points: forest.c brings it up to the scene, points.c places, tree_build.c splits, tree_refit.c computes nodes,
+/* Between the files of the hierarchy of points: forest.c brings it up to the scene, points.c places, tree_build.c splits, tree_looks.c reads materials, tree_refit.c computes nodes,
  * gi/kernels/forest.c does so eight at a time. */
 #ifndef EARTHSHINE_GI_MICRO_FOREST_PARTS_H
 #define EARTHSHINE_GI_MICRO_FOREST_PARTS_H
@@ -151,6 +151,8 @@ struct es_forest_private {
     uint64_t materials;
 };
 
+/* Reads the material at a tree's leaves; what inner nodes have is made from it with the nodes (ES_TREE_LOOKS), where it is not the same for all. */
+void es_forest_read_looks(es_context* context, es_point_forest* forest, const es_draw_list* list, uint32_t tree);
 /* Does the states' work; with `rest`, measures trees in their pose at rest and nothing else. */
 void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw_list* list, bool rest);
 /* Where a tree's leaves are in its own space; points[k].index = k. */
