@@ -46,15 +46,15 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
         const uint32_t count = end - begin < RUN ? end - begin : RUN;
         for (uint32_t j = 0; j < count; j++) {
             const uint32_t i = begin + j;
-            const vf dx = vf_set1(cut->c[0][i]) - here->p[0], dy = vf_set1(cut->c[1][i]) - here->p[1], dz = vf_set1(cut->c[2][i]) - here->p[2];
+            const vf dx = vf_set1(cut->nodes[i].c[0]) - here->p[0], dy = vf_set1(cut->nodes[i].c[1]) - here->p[1], dz = vf_set1(cut->nodes[i].c[2]) - here->p[2];
             const vf d2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(1e-30f)), d = vf_sqrt(d2), inverse = one / d;
-            const vf facing = vf_set1(cut->slab[i]) - (vf_set1(cut->axis[0][i]) * dx + vf_set1(cut->axis[1][i]) * dy + vf_set1(cut->axis[2][i]) * dz) + d * vf_set1(cut->sine[i]);
+            const vf facing = vf_set1(cut->nodes[i].slab) - (vf_set1(cut->nodes[i].axis[0]) * dx + vf_set1(cut->nodes[i].axis[1]) * dy + vf_set1(cut->nodes[i].axis[2]) * dz) + d * vf_set1(cut->nodes[i].sine);
             const vf z = here->n[0] * dx + here->n[1] * dy + here->n[2] * dz;
             const vm seen = vm_gt(z, d * vf_set1(GRAZING)) & vm_gt(facing, zero);
             across[j] = (here->t[0] * dx + here->t[1] * dy + here->t[2] * dz) * inverse;
             along[j] = (here->b[0] * dx + here->b[1] * dy + here->b[2] * dz) * inverse;
             up[j] = (lobe ? here->a[0] * dx + here->a[1] * dy + here->a[2] * dz : z) * inverse;
-            area[j] = vf_set1(job->settings.cover * cut->spread[i]) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one) * (inverse * inverse);
+            area[j] = vf_set1(job->settings.cover * cut->nodes[i].spread) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one) * (inverse * inverse);
             vi_store(key[j], vi_select(seen, depth_of(d2, job->inverse_square) | vi_set1((int32_t)i), vi_set1(EMPTY)));
         }
         for (uint32_t j = 0; j < count; j++) {
@@ -151,16 +151,16 @@ static void cast_lobe(const es_micro_job* job, const es_micro_scratch* s, const 
 static disc disc_in_axes(const es_micro_cut* cut, const lanes* here, uint32_t lane, uint32_t i)
 {
     float d[3], c[3] = {0, 0, 0}, n[3] = {0, 0, 0};
-    for (int k = 0; k < 3; k++) d[k] = cut->c[k][i] - here->p[k][lane];
+    for (int k = 0; k < 3; k++) d[k] = cut->nodes[i].c[k] - here->p[k][lane];
     for (int k = 0; k < 3; k++) {
         c[0] += here->t[k][lane] * d[k];
         c[1] += here->b[k][lane] * d[k];
         c[2] += here->a[k][lane] * d[k];
-        n[0] += here->t[k][lane] * cut->axis[k][i];
-        n[1] += here->b[k][lane] * cut->axis[k][i];
-        n[2] += here->a[k][lane] * cut->axis[k][i];
+        n[0] += here->t[k][lane] * cut->nodes[i].axis[k];
+        n[1] += here->b[k][lane] * cut->nodes[i].axis[k];
+        n[2] += here->a[k][lane] * cut->nodes[i].axis[k];
     }
-    disc disc = {.facing = vf_set1(n[0] * c[0] + n[1] * c[1] + n[2] * c[2]), .square = vf_set1(cut->r[i] * cut->r[i]), .word = vi_set1((int32_t)i)};
+    disc disc = {.facing = vf_set1(n[0] * c[0] + n[1] * c[1] + n[2] * c[2]), .square = vf_set1(cut->nodes[i].r * cut->nodes[i].r), .word = vi_set1((int32_t)i)};
     for (int k = 0; k < 3; k++) {
         disc.c[k] = vf_set1(c[k]);
         disc.n[k] = vf_set1(n[k]);
@@ -174,11 +174,11 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
     const bool lobe = here->mapping != ES_MICRO_COSINE;
     uint32_t any = 0;
     for (uint32_t i = cut->near; i < ES_MICRO_MAX_CUT; i++) {
-        const vf dx = vf_set1(cut->c[0][i]) - here->p[0], dy = vf_set1(cut->c[1][i]) - here->p[1], dz = vf_set1(cut->c[2][i]) - here->p[2], r = vf_set1(cut->r[i]);
+        const vf dx = vf_set1(cut->nodes[i].c[0]) - here->p[0], dy = vf_set1(cut->nodes[i].c[1]) - here->p[1], dz = vf_set1(cut->nodes[i].c[2]) - here->p[2], r = vf_set1(cut->nodes[i].r);
         const vf d2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(1e-30f)), z = here->n[0] * dx + here->n[1] * dy + here->n[2] * dz;
-        const vf facing = vf_neg(vf_set1(cut->axis[0][i]) * dx + vf_set1(cut->axis[1][i]) * dy + vf_set1(cut->axis[2][i]) * dz) - vf_sqrt(d2) * vf_set1(GRAZING);
+        const vf facing = vf_neg(vf_set1(cut->nodes[i].axis[0]) * dx + vf_set1(cut->nodes[i].axis[1]) * dy + vf_set1(cut->nodes[i].axis[2]) * dz) - vf_sqrt(d2) * vf_set1(GRAZING);
         /* a disc that the point all but lies on, and that faces as it does, stands for the point's own surface, which bends less than the disc is wide */
-        const vf alike = vf_max(here->n[0] * vf_set1(cut->axis[0][i]) + here->n[1] * vf_set1(cut->axis[1][i]) + here->n[2] * vf_set1(cut->axis[2][i]), vf_zero()), own = vf_set1(OWN_SURFACE) * alike * r;
+        const vf alike = vf_max(here->n[0] * vf_set1(cut->nodes[i].axis[0]) + here->n[1] * vf_set1(cut->nodes[i].axis[1]) + here->n[2] * vf_set1(cut->nodes[i].axis[2]), vf_zero()), own = vf_set1(OWN_SURFACE) * alike * r;
         const vm seen = vm_gt(z + r, vf_zero()) & vm_gt(facing, vf_zero()) & vm_ge(d2, own * own);
         vf measure = r * r;
         if (lobe) {
@@ -198,8 +198,8 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
         for (uint32_t i = cut->near; i < ES_MICRO_MAX_CUT; i++) {
             if (!(s->cast[i] >> lane & 1)) continue;
             const disc disc = disc_in_axes(cut, here, lane, i);
-            if (lobe) cast_lobe(job, s, &disc, cut->r[i], pixels_of(s, lane));
-            else cast_cosine(job, &job->table->rays[jitters[lane]], &disc, cut->r[i], pixels_of(s, lane));
+            if (lobe) cast_lobe(job, s, &disc, cut->nodes[i].r, pixels_of(s, lane));
+            else cast_cosine(job, &job->table->rays[jitters[lane]], &disc, cut->nodes[i].r, pixels_of(s, lane));
         }
     }
 }

@@ -143,13 +143,13 @@ VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, 
     for (; bits; bits &= bits - 1) {
         const uint32_t i = (uint32_t)__builtin_ctz(bits), at = near ? --cut->near : cut->count++;
         for (int k = 0; k < 3; k++) {
-            cut->c[k][at] = columns[k][i];
-            cut->axis[k][at] = columns[3 + k][i];
+            cut->nodes[at].c[k] = columns[k][i];
+            cut->nodes[at].axis[k] = columns[3 + k][i];
         }
-        cut->slab[at] = columns[6][i];
-        cut->sine[at] = columns[7][i];
-        cut->r[at] = columns[8][i];
-        cut->spread[at] = spread;
+        cut->nodes[at].slab = columns[6][i];
+        cut->nodes[at].sine = columns[7][i];
+        cut->nodes[at].r = columns[8][i];
+        cut->nodes[at].spread = spread;
         cut->radiance[at] = (uint32_t)words[0][i];
         cut->node[at] = (uint32_t)words[1][i];
     }

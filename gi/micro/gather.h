@@ -74,13 +74,18 @@ typedef struct es_micro_job {
     es_micro_pixel* picture;      /* of the last point gathered, rows of `size`; NULL: not wanted */
 } es_micro_job;
 
-/* Nodes in world space, one after another. */
+/* A node in world space, as it is drawn. */
+typedef struct es_micro_node {
+    float c[3], axis[3];
+    float slab;                            /* metres */
+    float sine;                            /* of the cone's half angle, less what is too grazing to matter */
+    float r;                               /* metres */
+    float spread;                          /* square of the radius of a disc of the node's area, m² */
+} es_micro_node;
+
+/* A record each, which is read from end to end: as columns they would come from the same sets of the cache. */
 typedef struct es_micro_cut {
-    float c[3][ES_MICRO_MAX_CUT + 8], axis[3][ES_MICRO_MAX_CUT + 8];
-    float slab[ES_MICRO_MAX_CUT + 8];      /* metres */
-    float sine[ES_MICRO_MAX_CUT + 8];      /* of the cone's half angle, less what is too grazing to matter */
-    float r[ES_MICRO_MAX_CUT + 8];
-    float spread[ES_MICRO_MAX_CUT + 8];    /* square of the radius of a disc of the node's area, m² */
+    es_micro_node nodes[ES_MICRO_MAX_CUT + 8];
     uint32_t radiance[ES_MICRO_MAX_CUT + 8]; /* RGB9E5; [65535] is 0 */
     uint32_t node[ES_MICRO_MAX_CUT + 8];   /* place in the forest's nodes */
     uint32_t count;                        /* nodes that no point of the cell opens: [0, count) */
