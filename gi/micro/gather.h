@@ -8,7 +8,7 @@
 
 enum {
     ES_MICRO_LANES = 8,
-    ES_MICRO_CELL = 64,           /* points that share a cut */
+    ES_MICRO_CELL = 16,           /* points that share a cut */
     ES_MICRO_PIXELS = ES_MICRO_MAX_SIZE * ES_MICRO_MAX_SIZE,
     ES_MICRO_MARGIN = ES_MICRO_MAX_SIZE + 8, /* empty words before and behind a buffer */
     ES_MICRO_LANE = ES_MICRO_PIXELS + 2 * ES_MICRO_MARGIN, /* from one buffer to the next: not a multiple of what would put all into the same sets of a cache */
