@@ -138,14 +138,16 @@ typedef struct es_renderer_settings {
     uint32_t bounce_vpls;            /* lights of each bounce after the first */
     uint32_t bounce_points;          /* ONE_PASS: points tried for each light that is reflected */
     uint32_t bounce_rays;            /* ONE_PASS with shadow maps: rays for each light, to some of those points; 0: the maps alone say what is seen */
-    /* micro-buffers: MICRO. What is above on virtual point lights, interleaving, filter, half_resolution and rays has no effect on it but through the lights
-     * of ES_MICRO_LIGHT_VPLS */
+    /* micro-buffers: MICRO. What is above on virtual point lights, interleaving, half_resolution and rays has no effect on it but through the lights of
+     * ES_MICRO_LIGHT_VPLS */
     uint32_t micro_size;             /* pixels of a micro-buffer's side, 8 … 32, a multiple of 4 (thesis: 24) */
     uint32_t micro_points;           /* of the whole scene, at most; each tree has a power of two */
     uint32_t micro_spacing;          /* 1, 2, 4: light is gathered at every so manieth pixel of every so manieth row, and interpolated along surfaces, what
                                       * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
-    float micro_cut;                 /* a node is drawn when its solid angle is at most this share of a pixel's */
-    float micro_cover;               /* it is drawn where a disc of so many times its area covers the pixel's middle: 1 covers as much as there is, with gaps, which are closed */
+    float micro_cut;                 /* a node is drawn, not opened, when its sphere's solid angle is at most this share of that of a pixel above the surface,
+                                      * pi / micro_size²; of a lobe's pixel, there */
+    float micro_cover;               /* it is drawn where a disc of so many times its area covers the ray through the pixel: with 1 things are as wide as they are, but have
+                                      * gaps; gaps between nodes are closed */
     uint32_t micro_filter;           /* with micro_spacing 1: diffuse light goes through the geometry-aware filter of that size, filter_passes times: its noise is that of
                                       * places in pixels, and neighbours have others; 1: not */
     bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
