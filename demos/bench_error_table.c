@@ -66,7 +66,7 @@ static const error_setting table[] = {
     {MICRO, "every pixel, 8²", "gi=micro micro.emission=false micro.size=8", false},
     {MICRO, "every pixel, 16²", "gi=micro micro.emission=false micro.size=16", false},
     {MICRO, "every pixel, 32²", "gi=micro micro.emission=false micro.size=32", false},
-    {MICRO, "every pixel, 24², 1M points", "gi=micro micro.emission=false micro.points=1048576", false},
+    {MICRO, "every pixel, 24², 256k points", "gi=micro micro.emission=false micro.points=262144", false},
     {MICRO_4, "8²", "gi=micro micro.emission=false micro.spacing=2 micro.size=8", false},
     {MICRO_4, "16²", "gi=micro micro.emission=false micro.spacing=2 micro.size=16", false},
     {MICRO_4, "24²", "gi=micro micro.emission=false micro.spacing=2", true},

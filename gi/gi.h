@@ -20,7 +20,7 @@ typedef enum es_gi_method {
     ES_GI_CLASSIC,  /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
     ES_GI_VPL_TRACED, /* the same lights, visibility by rays, every light at every pixel unless traced_interleave: a judge; slower */
     ES_GI_VPL_SAMPLED, /* the same lights, interleaved; of its share of them each pixel chooses one by what it would send and tests it by a ray */
-    ES_GI_MICRO     /* no such lights: at every pixel, or one of 4 or 16, light is gathered from a micro-buffer drawn of a hierarchy of points (Ritschel thesis §6) */
+    ES_GI_MICRO     /* without such lights, but for further bounces where asked for: at every pixel, or one of 4 or 16, light is gathered from a micro-buffer drawn of a hierarchy of points (Ritschel thesis §6) */
 } es_gi_method;
 
 /* What the methods with virtual point lights make of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
@@ -110,7 +110,7 @@ typedef struct es_renderer_settings {
     uint32_t filter_passes;          /* 0: none; 1: a box, in which single bright pixels leave n × n blocks; 2: a tent, which is smooth */
     float filter_depth;              /* largest relative depth difference (Knecht: 0.01) */
     float filter_normal;             /* smallest dot product of normals (Knecht: 0.8) */
-    bool half_resolution;            /* indirect light is shaded and filtered for one pixel of 2 × 2, and interpolated along surfaces for the others */
+    bool half_resolution;            /* but of MICRO: indirect light is shaded and filtered for one pixel of 2 × 2, and interpolated along surfaces for the others */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */
@@ -147,7 +147,7 @@ typedef struct es_renderer_settings {
     float micro_cut;                 /* a node is drawn, not opened, when its sphere's solid angle is at most this share of that of a pixel above the surface,
                                       * pi / micro_size²; of a lobe's pixel, there */
     float micro_cover;               /* it is drawn where a disc of so many times its area covers the ray through the pixel: with 1 things are as wide as they are, but have
-                                      * gaps; gaps between nodes are closed */
+                                      * gaps; gaps between nodes are closed. Without effect on what is distributed as a lobe is */
     uint32_t micro_filter;           /* with micro_spacing 1: diffuse light goes through the geometry-aware filter of that size, filter_passes times: its noise is that of
                                       * places in pixels, and neighbours have others; 1: not */
     bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
@@ -191,7 +191,8 @@ ES_API es_result es_renderer_image(es_renderer* renderer, const char* name, es_i
 /* Of ES_GI_MICRO: the micro-buffer that light is gathered from at a pixel of the last frame, for what reflects in all directions (by the cosine) or for the `lobe`;
  * radiance in W/(m² sr), distance in metres, 0 where nothing is; either may be NULL. `warped`: as it is, micro_size² pixels, all of which are worth the same; its
  * axes are turned as the pixel's place in the picture says. Else laid out over the hemisphere in 128² pixels: the normal in the middle, the angle from it
- * growing evenly to a right one at the rim of the disc, as who looks out of the surface sees it with the camera's right to the right. Where nothing is gathered, and with other methods, one black pixel. It is
+ * growing evenly to a right one at the rim of the disc, as who looks out of the surface sees it with the camera's right to the right. Where nothing is gathered, and with other methods, one black pixel; gaps between nodes, which
+ * the sum closes, show as nothing. It is
  * drawn by itself, with a cut of its own, and with the scene's points as they are now. The caller destroys the images. WRONG_STATE before the first frame,
  * INVALID_ARGUMENT outside the picture. */
 ES_API es_result es_renderer_micro_buffer(es_renderer* renderer, uint32_t x, uint32_t y, bool lobe, bool warped, es_image* radiance, es_image* distance);

@@ -12,7 +12,7 @@ void es_indirect_planes_free(es_context* context, es_indirect_planes* planes);
 /* All with the settings of the frame that is being, or was last, rendered. Lights from `lights` on send nothing; the others are shaded as if
  * they did, so that the light of the first n is what any frame adds up before it comes to the rest. */
 es_result es_indirect_shade(es_renderer* renderer, uint32_t lights, es_planes* irradiance, es_planes* specular);
-/* es_renderer.filter_passes times, one at least. */
+/* es_renderer.filter_passes times, one at least; of micro-buffers' light the irradiance alone. */
 es_result es_indirect_filter(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular);
 es_result es_indirect_upsample(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes* whole_irradiance, es_planes* whole_specular);
 

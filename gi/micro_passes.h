@@ -1,5 +1,6 @@
 /* The passes of micro-buffers: what ES_GI_MICRO has in place of lights, maps and shading. Their light goes to the renderer's planes, `irradiance` and
- * `specular`, at every pixel, from where history and composition take it as any other.
+ * `specular`, at every pixel, from where the filter (diffuse light, when it is gathered at every pixel), history and
+ * composition take it.
  *
  * With `temporal` each frame's buffers are turned otherwise. While nothing changes, frame k of these has turn k and the mean over all turns since is
  * what is blended with last frame's light, so that a settled picture is the mean over temporal_settle frames, whatever was before. With

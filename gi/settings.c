@@ -56,7 +56,7 @@ static const es_setting renderer_table[] = {
     {"micro.points", ES_SETTING_INT, "1048576", 1, 8388608, NULL, "points that stand for the scene, at most", AT(micro_points)},
     {"micro.spacing", ES_SETTING_INT, "1", 1, 4, NULL, "light is gathered at every pixel, or every 2nd or 4th in each dimension: 1, 2 or 4", AT(micro_spacing)},
     {"micro.cut", ES_SETTING_FLOAT, "4", 0.01, 100, NULL, "largest solid angle of a node that is drawn and not opened, share of a pixel's", AT(micro_cut)},
-    {"micro.cover", ES_SETTING_FLOAT, "1.3", 0.1, 100, NULL, "a node is drawn where so many times its area covers the pixel's ray: less leaves gaps, more lets things grow", AT(micro_cover)},
+    {"micro.cover", ES_SETTING_FLOAT, "1.3", 0.1, 100, NULL, "a node is drawn where so many times its area covers the pixel's ray: less leaves gaps, more lets things grow; not of lobes", AT(micro_cover)},
     {"micro.filter", ES_SETTING_INT, "4", 1, 16, NULL, "at every pixel: side of the geometry-aware filter of the diffuse light, filter.passes times; 1: none", AT(micro_filter)},
     {"micro.ray-cast", ES_SETTING_BOOL, "true", 0, 1, NULL, "points larger than a pixel are met by rays", AT(micro_ray_cast)},
     {"micro.warp", ES_SETTING_BOOL, "true", 0, 1, NULL, "a micro-buffer's pixels are distributed as the lobe is", AT(micro_warp)},
@@ -70,10 +70,10 @@ static const es_setting renderer_table[] = {
     {"micro.emission", ES_SETTING_BOOL, "true", 0, 1, NULL, "glowing surfaces send light", AT(micro_emission)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
-    {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent", AT(filter_passes)},
+    {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent; n is interleave, with gi micro micro.filter", AT(filter_passes)},
     {"filter.depth", ES_SETTING_FLOAT, "0.03", 0, 1, NULL, "largest relative depth difference the filter crosses", AT(filter_depth)},
     {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
-    {"half-resolution", ES_SETTING_BOOL, "false", 0, 1, NULL, "indirect light for one pixel of 2 × 2; the others are interpolated along their surface", AT(half_resolution)},
+    {"half-resolution", ES_SETTING_BOOL, "false", 0, 1, NULL, "indirect light for one pixel of 2 × 2; the others are interpolated along their surface; not with gi micro", AT(half_resolution)},
 
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},

@@ -1,7 +1,7 @@
 /* Micro-rendering (Ritschel thesis §6.2.2): the cut of a cell of gather points (micro_cut_simd.h), then each of them draws it, eight at a time, a lane each.
  *
- * A node whose sphere would cover a pixel more than the cut allows is opened; others are drawn into the pixel that their centre falls on (micro_map_simd.h), if
- * they are the nearest there. Of cosine-distributed pixels the measure is the sphere's angle on the disc before foreshortening, (r / d)², against cut / size²:
+ * A node whose sphere would cover a pixel more than the cut allows is opened; others are drawn into the pixel that their centre falls on (micro_map_simd.h), or
+ * whose ray is nearest, if a disc of their area covers that; where they are the nearest. Of cosine-distributed pixels the measure is the sphere's angle on the disc before foreshortening, (r / d)², against cut / size²:
  * near the horizon pixels are long and narrow, and by their solid angle nodes would be drawn that are wider than the pixel, and leave holes beside it. Of lobes
  * it is that angle times the density.
  *
@@ -34,7 +34,7 @@ static int32_t* pixels_of(es_micro_scratch* s, uint32_t lane) { return s->words[
 
 /* Nodes [first, end) of the cut, into one pixel each. In three short loops: what the lanes see, where that falls, and the pixels. In one loop the chain of
  * roots and divisions is longer than what a processor keeps in flight. Lanes that do not see a node get EMPTY, which is never nearer. */
-VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t first, uint32_t end, bool lobe)
+VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t first, uint32_t end, vm wanted, bool lobe)
 {
     enum { RUN = 32 };
     const es_micro_table* table = job->table;
@@ -50,7 +50,7 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
             const vf d2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(1e-30f)), d = vf_sqrt(d2), inverse = one / d;
             const vf facing = vf_set1(cut->nodes[i].slab) - (vf_set1(cut->nodes[i].axis[0]) * dx + vf_set1(cut->nodes[i].axis[1]) * dy + vf_set1(cut->nodes[i].axis[2]) * dz) + d * vf_set1(cut->nodes[i].sine);
             const vf z = here->n[0] * dx + here->n[1] * dy + here->n[2] * dz;
-            const vm seen = vm_gt(z, d * vf_set1(GRAZING)) & vm_gt(facing, zero);
+            const vm seen = vm_gt(z, d * vf_set1(GRAZING)) & vm_gt(facing, zero) & wanted;
             across[j] = (here->t[0] * dx + here->t[1] * dy + here->t[2] * dz) * inverse;
             along[j] = (here->b[0] * dx + here->b[1] * dy + here->b[2] * dz) * inverse;
             up[j] = (lobe ? here->a[0] * dx + here->a[1] * dy + here->a[2] * dz : z) * inverse;
@@ -81,10 +81,10 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
     }
 }
 
-static void draw_small(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t first, uint32_t end)
+static void draw_small(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t first, uint32_t end, vm wanted)
 {
-    if (here->mapping == ES_MICRO_COSINE) draw_small_as(job, s, here, first, end, false);
-    else draw_small_as(job, s, here, first, end, true);
+    if (here->mapping == ES_MICRO_COSINE) draw_small_as(job, s, here, first, end, wanted, false);
+    else draw_small_as(job, s, here, first, end, wanted, true);
 }
 
 /* ---- leaves that are near -------------------------------------------------------------------------------------------------------------- */
@@ -186,8 +186,9 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
             measure = measure * lane_bound(here, x, up, vf_min(r * inverse, vf_set1(1.0f)));
         }
         const vm large = vm_gt(measure, vf_set1(open) * d2) | vm_gt(r * r, d2);
-        const uint32_t cast = job->settings.ray_cast ? vm_bits(seen & large) & bits : 0, draw = vm_bits(seen) & bits & ~cast;
-        if (draw) draw_small(job, s, here, i, i + 1);
+        const vm met = job->settings.ray_cast ? seen & large : vi_zero();
+        const uint32_t cast = vm_bits(met) & bits;
+        if (vm_bits(seen & ~met) & bits) draw_small(job, s, here, i, i + 1, seen & ~met);
         s->cast[i] = (uint8_t)cast;
         any |= cast;
         s->stats.cast += (uint32_t)__builtin_popcount(cast);
@@ -349,7 +350,7 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
         for (int k = 0; k < 2; k++) here.shift[k][i] = table->rays[jitters[i]].shift[k];
     }
     if (mapping != ES_MICRO_COSINE) tabulate_lobe(table, &here, s);
-    draw_small(job, s, &here, 0, s->cut.count);
+    draw_small(job, s, &here, 0, s->cut.count, vm_all_lanes());
     draw_near(job, s, &here, jitters, open, count < VW ? (1u << count) - 1 : 0xffu);
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t index = job->order[first + i];

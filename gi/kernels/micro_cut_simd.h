@@ -73,17 +73,14 @@ VINL vf lobe_bound(const cell* cell, vf cosine, vf sphere_sine)
     const vf nearest = vf_select(vm_ge(cosine, c), one, vf_min(cosine * c + sine * s, one));
     if (cell->mapping == ES_MICRO_PHONG) {
         const vf x = vf_max(nearest, vf_set1(1e-6f));
-        return vf_set1(0.5f) * vf_max(vf_set1(cell->most + 1.0f) * vf_pow(x, vf_set1(cell->most)), vf_set1(cell->least + 1.0f) * vf_pow(x, vf_set1(cell->least)));
+        return vf_set1(0.5f * (cell->most + 1.0f)) * vf_pow(x, vf_set1(cell->least));
     }
     const vf half = vf_set1(0.5f) + vf_set1(0.5f) * nearest;
     const float nv = cell->view_cosine;
-    vf bound = zero;
-    for (int k = 0; k < 2; k++) {
-        const float alpha2 = k ? cell->most : cell->least, rest = 1.0f - alpha2;
-        const vf d = one - half * vf_set1(rest);
-        bound = vf_max(bound, vf_set1(0.5f * alpha2 / (nv + es_sqrt(alpha2 + rest * nv * nv))) / (d * d));
-    }
-    return bound;
+    /* alpha² / (1 - h (1 - alpha²))² is largest at alpha² = (1 - h) / h */
+    const vf least = vf_set1(cell->least), alpha2 = vf_min(vf_max((one - half) / half, least), vf_set1(cell->most)), d = one - half * (one - alpha2);
+    const float rest = 1.0f - cell->least;
+    return alpha2 * vf_set1(0.5f / (nv + es_sqrt(cell->least + rest * nv * nv))) / (d * d);
 }
 
 /* Which of eight nodes some point of the cell may see, and which of these it opens. */
@@ -104,7 +101,8 @@ VINL vm classify(const cell* cell, const nodes_v* v, float open, vm* opened)
     vm inside = vi_zero();
     if (cell->mapping != ES_MICRO_COSINE) {
         const vf inverse = one / vf_max(d, vf_set1(1e-15f)), sine = (v->r + r) * inverse;
-        inside = vm_ge(sine, one);
+        /* however many spheres they lie in, there is an end to opening them */
+        inside = vm_ge(sine, one) & vm_gt(v->r * v->r, vf_set1(open * 1e-3f) * square);
         if (cell->mirror_cosine > -2.0f)
             measure = measure * lobe_bound(cell, (vf_set1(cell->mirror[0]) * dx + vf_set1(cell->mirror[1]) * dy + vf_set1(cell->mirror[2]) * dz) * inverse, vf_min(sine, one));
     }
@@ -122,7 +120,7 @@ typedef struct finder {
 } finder;
 
 /* To the world: small nodes from the cut's beginning on, leaves that are near from its end. */
-VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, float spread, uint32_t bits, bool near)
+VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, uint32_t bits, bool near)
 {
     es_micro_cut* cut = &f->s->cut;
     if (cut->near - cut->count < VW || cut->count > f->most || ES_MICRO_MAX_CUT - cut->near > f->most_near) {
@@ -149,7 +147,7 @@ VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, 
         cut->nodes[at].slab = columns[6][i];
         cut->nodes[at].sine = columns[7][i];
         cut->nodes[at].r = columns[8][i];
-        cut->nodes[at].spread = spread;
+        cut->nodes[at].spread = f->job->forest->area[(uint32_t)words[1][i]] * 0.318309886f;
         cut->radiance[at] = (uint32_t)words[0][i];
         cut->node[at] = (uint32_t)words[1][i];
     }
@@ -160,12 +158,10 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
 {
     const es_point_forest* forest = f->job->forest;
     const es_point_node* packed = forest->nodes + tree->first;
-    const es_point_node_float* floats = forest->float_nodes + tree->first;
+    const es_point_node_float* floats = quantised ? NULL : forest->float_nodes + tree->first;
     uint32_t *wave = f->s->wave[0], *next = f->s->wave[1], count = 1;
     wave[0] = 1;
-    /* all nodes of a level have as many leaves, and leaves of a tree have one size */
-    float spread = forest->area[tree->first + 1] * 0.318309886f;
-    for (; count && !f->full; spread *= 0.5f) {
+    while (count && !f->full) {
         uint32_t opened_count = 0;
         for (uint32_t i = count; i < (count + 7) / 8 * 8; i++) wave[i] = 1;
         const bool leaves = wave[0] >= tree->leaf_count; /* all of a level are of one kind */
@@ -176,7 +172,7 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
             const vm seen = classify(&f->here, &v, f->open, &opened) & vm_first((int32_t)(count - i));
             const uint32_t kept = vm_bits(seen & ~opened);
             uint32_t down = vm_bits(seen & opened);
-            if (kept) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), spread, kept, false);
+            if (kept) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), kept, false);
             if (!leaves) {
                 if (opened_count + 2 * VW > 2 * ES_MICRO_MAX_CUT - VW) {
                     f->full = true;
@@ -195,7 +191,7 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
                     if (index != UINT32_MAX) trees[(*tree_count)++] = index;
                 }
             } else if (down) {
-                keep(f, tree, &v, at + vi_set1((int32_t)tree->first), spread, down, true);
+                keep(f, tree, &v, at + vi_set1((int32_t)tree->first), down, true);
             }
         }
         uint32_t* swapped = wave;

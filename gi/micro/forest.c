@@ -500,11 +500,11 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
     bool resting_trees = false;
     for (uint32_t i = 0; i < forest->tree_count; i++) resting_trees = resting_trees || (own->states[i].base < 0.0 && own->states[i].mesh->rest_positions);
     if (resting_trees) {
-        es_forest_refit(context, forest, list, true);
+        es_forest_refit(context, forest, true);
         for (uint32_t i = 0; i < forest->tree_count; i++)
             if (own->states[i].base < 0.0) own->states[i].base = own->states[i].measure;
     }
-    es_forest_refit(context, forest, list, false);
+    es_forest_refit(context, forest, false);
     bool again = false;
     for (uint32_t i = 0; i < forest->tree_count; i++) {
         es_tree_state* state = &own->states[i];
@@ -519,7 +519,7 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
         count->built++;
     }
     if (again) {
-        es_forest_refit(context, forest, list, false);
+        es_forest_refit(context, forest, false);
         for (uint32_t i = 0; i < forest->tree_count; i++)
             if (own->states[i].base < 0.0) own->states[i].base = own->states[i].measure;
     }

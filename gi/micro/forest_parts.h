@@ -154,7 +154,7 @@ struct es_forest_private {
 /* Reads the material at a tree's leaves; what inner nodes have is made from it with the nodes (ES_TREE_LOOKS), where it is not the same for all. */
 void es_forest_read_looks(es_context* context, es_point_forest* forest, const es_draw_list* list, uint32_t tree);
 /* Does the states' work; with `rest`, measures trees in their pose at rest and nothing else. */
-void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw_list* list, bool rest);
+void es_forest_refit(es_context* context, es_point_forest* forest, bool rest);
 /* Where a tree's leaves are in its own space; points[k].index = k. */
 void es_forest_stand(es_context* context, const es_point_forest* forest, uint32_t tree, es_split_point* points);
 /* The tree of trees; `order` holds an es_split_point for each tree. */

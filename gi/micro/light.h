@@ -30,7 +30,7 @@ es_result es_points_light_direct(es_context* context, es_point_forest* forest, c
 /* Leaves [leaf, leaf + count) of the forest's, which are the nodes from `node` on, of that tree. */
 typedef struct es_leaf_range { size_t leaf, node; uint32_t count, tree; } es_leaf_range;
 
-/* Calls body for all leaves, in parallel, in pieces that do not cross trees: of some hundred leaves, or of a small tree's. */
+/* Calls body for all leaves, in parallel, in pieces that do not cross trees: of up to 4096 leaves, or of a small tree's. */
 typedef void (*es_leaf_body)(void* user, const es_leaf_range* range, uint32_t worker);
 void es_forest_each_leaf(es_context* context, const es_point_forest* forest, es_leaf_body body, void* user);
 

@@ -25,9 +25,10 @@ typedef struct es_gather_point {
 } es_gather_point;
 
 typedef struct es_micro_settings {
-    uint32_t size;         /* of the micro-buffers, pixels a side, 8 … 32, a multiple of 8 or 4 */
-    float cut;             /* a node is drawn when its solid angle is no more than this share of the pixel's it falls on */
-    float cover;           /* nodes are drawn where a disc of so many times their area, turned as they are, covers the pixel's middle; gaps are closed */
+    uint32_t size;         /* of the micro-buffers, pixels a side, 8 … 32, a multiple of 4 */
+    float cut;             /* a node is drawn, not opened, when its sphere's solid angle is at most this share of pi / size², or of a lobe's pixel there */
+    float cover;           /* cosine-distributed pixels: a node is drawn into the one whose ray is nearest to its centre, where a disc of so many times its area covers
+                            * that ray; lobes': into the pixel of its centre. Gaps are closed */
     bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn into one pixel */
     bool warp;             /* pixels are distributed as the lobe is; off: as the cosine, and weighted */
     bool quantised;        /* nodes of 128 bits; off: floats */
@@ -47,7 +48,7 @@ typedef struct es_micro_pixel {
 es_result es_micro_look(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* point, es_micro_pixel* pixels);
 
 /* result[k][i] of point i. Points are gathered in cells along a space-filling curve, in parallel. Those of a cell share a cut, which is as fine as any of them
- * wants: what a point gets depends a little on its neighbours, but not on threads or instruction sets. stats may be NULL. */
+ * wants, or coarser where one point alone would draw more than 65528 nodes: what a point gets depends a little on its neighbours, but not on threads or instruction sets. stats may be NULL. */
 es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats);
 
 #endif

@@ -7,7 +7,7 @@
 #include "platform/random.h"
 #include "raster/pack.h"
 
-/* Points that are gathered at together, at the most but for one row more: their memory, about 80 bytes each, does not grow with the image. */
+/* Points that are gathered at together, at the most but for one row more: their memory, about 100 bytes each, does not grow with the image. */
 enum { BATCH = 1 << 18 };
 
 typedef struct pixel_loop {

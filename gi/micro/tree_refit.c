@@ -17,7 +17,6 @@ static uint32_t blocks_of(const es_point_tree* tree) { return tree->leaf_count /
 
 typedef struct refitting {
     es_point_forest* forest;
-    const es_draw_list* list;
     const es_gi_kernels* kernels;
     bool rest, again;
 } refitting;
@@ -225,10 +224,10 @@ static void find_box(es_context* context, const refitting* r, es_tree_state* sta
     }
 }
 
-void es_forest_refit(es_context* context, es_point_forest* forest, const es_draw_list* list, bool rest)
+void es_forest_refit(es_context* context, es_point_forest* forest, bool rest)
 {
     struct es_forest_private* own = forest->own;
-    refitting r = {forest, list, es_gi_kernel_table(es_context_isa(context)), rest, false};
+    refitting r = {forest, es_gi_kernel_table(es_context_isa(context)), rest, false};
     if (!rest)
         for (uint32_t i = 0; i < forest->tree_count; i++)
             if (own->states[i].work & ES_TREE_NODES) find_box(context, &r, &own->states[i]);
