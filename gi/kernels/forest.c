@@ -301,7 +301,7 @@ void ES_KERNEL(es_gi_forest_quantise)(const es_node_frame* frame, const es_node_
         vi q[3];
         for (int k = 0; k < 3; k++) q[k] = vi_round(vf_min(vf_max((node[k] - vf_set1(frame->low[k])) * inverse[k], vf_zero()), most));
         const vm absent = vm_lt(node[3], vf_zero());
-        vi radius = vi_truncate(vf_min((node[3] + error) * per_radius * vf_set1(1.0f + 1e-6f), most)) + vi_set1(1);
+        vi radius = vi_truncate(vf_min(vf_max((node[3] + error) * per_radius * vf_set1(1.0f + 1e-6f), vf_zero()), most)) + vi_set1(1);
         radius = vi_select(absent, vi_zero(), vi_min(radius, vi_set1(65535)));
 
         const vf norm = one / vf_max(vf_abs(node[4]) + vf_abs(node[5]) + vf_abs(node[6]), vf_set1(1e-30f));

@@ -54,7 +54,7 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
             across[j] = (here->t[0] * dx + here->t[1] * dy + here->t[2] * dz) * inverse;
             along[j] = (here->b[0] * dx + here->b[1] * dy + here->b[2] * dz) * inverse;
             up[j] = (lobe ? here->a[0] * dx + here->a[1] * dy + here->a[2] * dz : z) * inverse;
-            area[j] = vf_set1(job->settings.cover * cut->nodes[i].spread) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one) * (inverse * inverse);
+            area[j] = vf_min(vf_set1(job->settings.cover * cut->nodes[i].spread) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one) * (inverse * inverse), vf_set1(64.0f)); /* 4 covers all */
             vi_store(key[j], vi_select(seen, depth_of(d2, job->inverse_square) | vi_set1((int32_t)i), vi_set1(EMPTY)));
         }
         for (uint32_t j = 0; j < count; j++) {

@@ -81,7 +81,7 @@ static void look_around(const es_leaf_grid* g, const int32_t cell[3], const floa
             inner = inner && step[k] > -reach && step[k] < reach;
         }
         /* a hundredth for the rounding of places in cells */
-        if (inner || !(far * 0.99f < n->facing * (scale * scale))) continue;
+        if (inner || !(far * 0.99f / (scale * scale) < n->facing)) continue;
         look_in_cell(g, (const int32_t[3]){cell[0] + step[0], cell[1] + step[1], cell[2] + step[2]}, n);
     }
 }

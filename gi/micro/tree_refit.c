@@ -96,8 +96,10 @@ static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree*
     for (int i = 0; i < 9; i++) u[i] = largest > 0.0f ? job.u[i] / largest : 0.0f;
     const float cofactors[9] = {u[4] * u[8], -u[3] * u[8], u[3] * u[7] - u[4] * u[6], 0, u[0] * u[8], -u[0] * u[7], 0, 0, u[0] * u[4]};
     memcpy(job.cofactors, cofactors, sizeof cofactors);
-    /* a power of two, so that nothing is rounded */
-    job.magnify = es_exp2(-es_floor(es_log2(es_clampf(diagonal(state), 1e-30f, 1e30f))));
+    /* a power of two, so that nothing is rounded; a tree that is new, or of one leaf, has no extent yet, its mesh has */
+    const es_vec3 mesh = es_v3_sub(state->mesh->bounds_max, state->mesh->bounds_min);
+    const float extent = es_maxf(diagonal(state), largest * es_maxf(mesh.x, es_maxf(mesh.y, mesh.z)));
+    job.magnify = extent > 0.0f ? es_exp2(-es_floor(es_log2(es_clampf(extent, 1e-30f, 1e30f)))) : 1.0f;
     memcpy(job.rotation, tree->rotation, sizeof job.rotation);
     memcpy(job.translation, tree->translation, sizeof job.translation);
     return job;
