@@ -224,6 +224,7 @@ static void test_interpolation(void** state)
     settings.micro_size = 16; /* noise would be larger than what interpolation leaves out */
     settings.micro_points = 8192;
     settings.micro_filter = 1;
+    settings.micro_cut = 1; /* the coarser cuts are, the more they differ between cells */
     stage s = open_stage("cornell", 1, 0, &settings);
     render(&s);
     es_image full = image_of(&s, "irradiance");
@@ -253,8 +254,8 @@ static void test_interpolation(void** state)
                 }
         /* edges are there, and little else */
         assert_true(up->count > 0 && up->count < lit / 3);
-        /* what was gathered at is the same but for cuts, which gather points share: where few are, they are finer; single pixels in corners differ by more */
-        if (!(there_errors < 0.07 * there_sum)) fail_msg("spacing %u: relative L1 %.4f where light was gathered", spacing, there_errors / there_sum);
+        /* what was gathered at is the same but for cuts, which gather points share; single pixels in corners differ by more */
+        if (!(there_errors < 0.05 * there_sum)) fail_msg("spacing %u: relative L1 %.4f where light was gathered", spacing, there_errors / there_sum);
         /* so wide as pixels and points are few here, and edges many */
         if (!(errors < (spacing == 2 ? 0.1 : 0.16) * sum)) fail_msg("spacing %u: relative L1 %.4f", spacing, errors / sum);
         assert_true(pass_of(&s, "micro-buffers")->count < samples / (spacing * spacing) * 5 / 4);
