@@ -68,6 +68,20 @@ static inline void add_rectangle(small_world* w, es_vec3 corner, es_vec3 u, es_v
     add_instance(w, &(es_mesh_desc){.vertex_count = 4, .triangle_count = 2, .positions = &p[0].x, .indices = indices, .flat_normals = true}, material);
 }
 
+/* 2 m × 2 m × 2 m about the origin, facing inside. */
+static inline void add_closed_box(small_world* w, const es_material_desc* material)
+{
+    for (int k = 0; k < 3; k++)
+        for (int side = -1; side <= 1; side += 2) {
+            es_vec3 corner = es_v3(-1, -1, -1), u = es_v3(0, 0, 0), v = u;
+            (&corner.x)[k] = (float)side;
+            (&u.x)[(k + 1) % 3] = 2;
+            (&v.x)[(k + 2) % 3] = 2;
+            if (side < 0) add_rectangle(w, corner, u, v, material);
+            else add_rectangle(w, corner, v, u, material);
+        }
+}
+
 /* 2 segments × segments quads with smooth normals, inscribed in the sphere, facing its inside or its outside. */
 static inline void add_sphere(small_world* w, es_vec3 centre, float radius, uint32_t segments, bool inside, const es_material_desc* material)
 {

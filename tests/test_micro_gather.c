@@ -49,15 +49,7 @@ static void furnace(room* r, uint32_t points)
 {
     *r = (room){.w = small_world_create()};
     const es_material_desc m = lambert(0, 2);
-    for (int k = 0; k < 3; k++)
-        for (int side = -1; side <= 1; side += 2) {
-            es_vec3 corner = es_v3(-1, -1, -1), u = es_v3(0, 0, 0), v = u;
-            (&corner.x)[k] = (float)side;
-            (&u.x)[(k + 1) % 3] = 2;
-            (&v.x)[(k + 2) % 3] = 2;
-            if (side < 0) add_rectangle(&r->w, corner, u, v, &m);
-            else add_rectangle(&r->w, corner, v, u, &m);
-        }
+    add_closed_box(&r->w, &m);
     bring(r, points);
 }
 

@@ -46,21 +46,6 @@ static void leave(room* r)
     small_world_destroy(&r->w);
 }
 
-static void add_box(small_world* w, const es_material_desc* material)
-{
-    for (int k = 0; k < 3; k++)
-        for (int side = -1; side <= 1; side += 2) {
-            es_vec3 corner = es_v3(0, 0, 0), u = corner, v = corner;
-            (&corner.x)[k] = (float)side;
-            (&corner.x)[(k + 1) % 3] = -1;
-            (&corner.x)[(k + 2) % 3] = -1;
-            (&u.x)[(k + 1) % 3] = 2;
-            (&v.x)[(k + 2) % 3] = 2;
-            if (side < 0) add_rectangle(w, corner, u, v, material);
-            else add_rectangle(w, corner, v, u, material);
-        }
-}
-
 static es_light_desc lamp(float intensity)
 {
     es_light_desc d = es_default_light_desc();
@@ -132,7 +117,7 @@ static void test_box(void** state)
     room r = {.w = small_world_create()};
     const float albedo = 0.5f;
     const es_material_desc m = lambert(albedo, 0);
-    add_box(&r.w, &m);
+    add_closed_box(&r.w, &m);
     add_light(&r.w, lamp(2), es_v3(0.2f, 0.1f, -0.3f), es_v3(0, -1, 0));
     bring(&r, false);
     light(&r, 2, false);
@@ -164,7 +149,7 @@ static void test_glow(void** state)
     room r = {.w = small_world_create()};
     const float albedo = 0.6f;
     const es_material_desc m = lambert(albedo, 2);
-    add_box(&r.w, &m);
+    add_closed_box(&r.w, &m);
     bring(&r, true);
     double expected = 0, power = 2;
     for (uint32_t bounces = 1; bounces <= 2; bounces++) {
@@ -246,7 +231,7 @@ static void test_same_bits(void** state)
             es_material_desc m = lambert(0.7f, 0);
             m.specular = 1;
             m.roughness = 0.3f;
-            add_box(&r.w, &m);
+            add_closed_box(&r.w, &m);
             m.metallic = 1;
             m.double_sided = true;
             m.emission[0] = 2;
@@ -278,7 +263,7 @@ static void test_little(void** state)
     for (int what = 0; what < 4; what++) {
         room r = {.w = small_world_create()};
         const es_material_desc m = lambert(what == 3 ? 0 : 0.5f, 0);
-        if (what >= 2) add_box(&r.w, &m);
+        if (what >= 2) add_closed_box(&r.w, &m);
         if (what & 1) add_light(&r.w, lamp(5), es_v3(0, 0, 0), es_v3(0, -1, 0));
         bring(&r, true);
         const es_photon_stats stats = light(&r, 2, true);
@@ -294,7 +279,7 @@ static void time_all(void)
 {
     room r = {.w = small_world_create()};
     const es_material_desc m = lambert(0.7f, 0);
-    add_box(&r.w, &m);
+    add_closed_box(&r.w, &m);
     add_sphere(&r.w, es_v3(0.2f, -0.3f, 0), 0.4f, 64, false, &m);
     add_light(&r.w, lamp(5), es_v3(-0.6f, 0.5f, 0.1f), es_v3(0, -1, 0));
     bring(&r, false);

@@ -39,22 +39,6 @@ static void leave(room* r)
     small_world_destroy(&r->w);
 }
 
-/* 2 m × 2 m × 2 m, facing inside. */
-static void add_box(small_world* w, const es_material_desc* material)
-{
-    for (int k = 0; k < 3; k++)
-        for (int side = -1; side <= 1; side += 2) {
-            es_vec3 corner = es_v3(0, 0, 0), u = corner, v = corner;
-            (&corner.x)[k] = (float)side;
-            (&corner.x)[(k + 1) % 3] = -1;
-            (&corner.x)[(k + 2) % 3] = -1;
-            (&u.x)[(k + 1) % 3] = 2;
-            (&v.x)[(k + 2) % 3] = 2;
-            if (side < 0) add_rectangle(w, corner, u, v, material);
-            else add_rectangle(w, corner, v, u, material);
-        }
-}
-
 static es_radiosity_job job_of(uint32_t iterations)
 {
     return (es_radiosity_job){.level = LEVEL, .iterations = iterations, .micro = {.size = 16, .cut = 1, .cover = 2, .ray_cast = true, .warp = true, .quantised = true}, .seed = 5, .lobes = &lobes};
@@ -93,7 +77,7 @@ static void test_furnace(void** state)
     for (int i = 0; i < 4; i++) {
         room r = {.w = small_world_create()};
         const es_material_desc m = lambert(albedos[i], 2);
-        add_box(&r.w, &m);
+        add_closed_box(&r.w, &m);
         bring(&r);
         double expected = 2, power = 2;
         for (uint32_t n = 0; n <= 3; n++) {
@@ -174,7 +158,7 @@ static void test_same_bits(void** state)
             es_material_desc m = lambert(0.7f, 1);
             m.specular = 1;
             m.roughness = 0.3f;
-            add_box(&r.w, &m);
+            add_closed_box(&r.w, &m);
             m.emission[0] = 9;
             add_sphere(&r.w, es_v3(0.2f, -0.3f, 0), 0.4f, 8, false, &m);
             const es_forest_request request = {.points = 2048, .rebuild = 1.5f};
