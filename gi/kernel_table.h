@@ -57,8 +57,8 @@
     /* gi/micro/forest_parts.h */                                                                                \
     X(forest_box, (const float* positions, const float u[9], uint32_t begin, uint32_t end, float low[3], float high[3])) \
     X(forest_leaves, (const es_leaf_job* job, uint32_t begin, uint32_t end))                                     \
-    X(forest_merge, (const es_node_columns* columns, uint32_t level, const float* child_area, float* area, float* sum)) \
-    X(forest_quantise, (const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, es_point_node* nodes)) \
+    X(forest_merge, (const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)) \
+    X(forest_quantise, (const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)) \
     X(forest_pull, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_pack, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_blend, (const es_node_looks* looks, uint32_t begin, uint32_t end))                                  \

@@ -369,5 +369,23 @@ VINL void vf_store4(float* p, vf a, vf b, vf c, vf d)
     }
 #endif
 }
+/* The first three of each record; the fourth stays as it is. */
+VINL void vf_store3(float* p, vf a, vf b, vf c)
+{
+#if defined(ES_SIMD_256)
+    __m256 t0 = _mm256_unpacklo_ps((__m256)a, (__m256)b), t1 = _mm256_unpackhi_ps((__m256)a, (__m256)b);
+    __m256 t2 = _mm256_unpacklo_ps((__m256)c, (__m256)c), t3 = _mm256_unpackhi_ps((__m256)c, (__m256)c);
+    __m256 r0 = _mm256_shuffle_ps(t0, t2, 0x44), r1 = _mm256_shuffle_ps(t0, t2, 0xee);
+    __m256 r2 = _mm256_shuffle_ps(t1, t3, 0x44), r3 = _mm256_shuffle_ps(t1, t3, 0xee);
+    _mm256_storeu_ps(p, _mm256_blend_ps(_mm256_permute2f128_ps(r0, r1, 0x20), _mm256_loadu_ps(p), 0x88));
+    _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_permute2f128_ps(r2, r3, 0x20), _mm256_loadu_ps(p + 8), 0x88));
+    _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_permute2f128_ps(r0, r1, 0x31), _mm256_loadu_ps(p + 16), 0x88));
+    _mm256_storeu_ps(p + 24, _mm256_blend_ps(_mm256_permute2f128_ps(r2, r3, 0x31), _mm256_loadu_ps(p + 24), 0x88));
+#else
+    for (int i = 0; i < VW; i++) {
+        p[4 * i] = a[i]; p[4 * i + 1] = b[i]; p[4 * i + 2] = c[i];
+    }
+#endif
+}
 
 #endif

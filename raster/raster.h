@@ -96,6 +96,7 @@ typedef struct es_raster_mesh {
     uint32_t vertex_count, triangle_count;
     es_vec3 bounds_min, bounds_max;   /* of positions (and previous_positions) */
     uint64_t revision;                /* differs whenever positions differ, in this mesh or from another mesh */
+    uint64_t rest_revision;           /* differs whenever the pose at rest or the triangles differ, likewise; 0: unknown, who needs it compares them. Not drawn */
 } es_raster_mesh;
 
 typedef struct es_raster_instance {

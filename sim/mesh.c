@@ -135,7 +135,7 @@ static bool fill(es_world* world, es_mesh_object* mesh, const es_mesh_desc* desc
     size_t bytes = es_mesh_stream_bytes(count);
     mesh->raster.vertex_count = count;
     mesh->raster.triangle_count = desc->triangle_count;
-    mesh->raster.revision = es_context_next_serial(world->context);
+    mesh->raster.revision = mesh->raster.rest_revision = es_context_next_serial(world->context);
     mesh->positions = es_allocate(context, bytes);
     if (!mesh->positions) return false;
     mesh->indices = es_allocate(context, index_bytes(desc->triangle_count));
@@ -310,7 +310,7 @@ void es_mesh_reindexed(es_world* world, es_mesh_object* mesh)
         es_release(world->context, mesh->fans, sizeof *mesh->fans);
         mesh->fans = NULL;
     }
-    mesh->raster.revision = es_context_next_serial(world->context);
+    mesh->raster.revision = mesh->raster.rest_revision = es_context_next_serial(world->context);
     if (mesh->object.references) world->geometry_touched = world->list_dirty = true;
 }
 

@@ -75,13 +75,14 @@ static void make_nodes(const es_gi_kernels* kernels, es_leaf_job job, uint32_t l
     job.normal = (uint32_t*)at(o->normal);
     kernels->forest_box(job.positions, job.u, 0, CORNERS - 3, o->box, o->box + 3);
     kernels->forest_leaves(&job, 0, leaves);
-    for (uint32_t level = leaves / 2; level; level /= 2) kernels->forest_merge(&columns, level, at(o->area) + 2 * level, at(o->area) + level, &o->sums[level % 2]);
+    for (uint32_t level = leaves / 2; level; level /= 2) kernels->forest_merge(&columns, level, level == leaves / 2, at(o->area) + 2 * level, at(o->area) + level, &o->sums[level % 2]);
     es_node_frame frame = {.radius_step = 4.0f / 65535.0f, .error = 1e-4f};
     for (int k = 0; k < 3; k++) {
         frame.low[k] = -2.0f;
         frame.step[k] = k == 1 ? 0.0f : 4.0f / 65535.0f;
     }
-    kernels->forest_quantise(&frame, &columns, 1, 2 * leaves - 1, (es_point_node*)at(o->nodes) + 1);
+    kernels->forest_quantise(&frame, &columns, 1, leaves - 1, false, (es_point_node*)at(o->nodes) + 1);
+    kernels->forest_quantise(&frame, &columns, leaves, leaves, true, (es_point_node*)at(o->nodes) + leaves);
 }
 
 static void check_nodes(void** state)
@@ -225,6 +226,7 @@ static void time_all(uint32_t threads, bool floats)
     for (uint32_t frame = 0; frame < 12; frame++) {
         shape_ring(positions, 0.02f * (float)(frame + 1));
         mesh.revision = frame + 1;
+        mesh.rest_revision = 1;
         double ms = milliseconds(context, &forest, &list, floats, &update);
         if (frame == 0) built = ms;
         else if (!update.refit || update.built) printf("not refitted alone\n");

@@ -1245,6 +1245,8 @@ static void test_simd_operations(void** state)
                     assert_int_equal(result[(size_t)(ES_SIMD_vf_load4_a + word) * COUNT + i + lane], to_bits(a[at + 4 * lane + word]));
                     const float record[4] = {a[i + 2 * word + lane / 4], b[i + 2 * word + lane / 4], c[i + 2 * word + lane / 4], (float)(2 * word + lane / 4)};
                     assert_int_equal(result[(size_t)(ES_SIMD_vf_store4_0 + word) * COUNT + i + lane], to_bits(record[lane % 4]));
+                    const float others[4] = {record[1], record[2], record[0], record[3]};
+                    assert_int_equal(result[(size_t)(ES_SIMD_vf_store3_0 + word) * COUNT + i + lane], to_bits(others[lane % 4]));
                 }
             }
         }

@@ -66,6 +66,8 @@ typedef struct v3 { vf x, y, z; } v3;
 VINL v3 v3_sub(v3 a, v3 b) { return (v3){a.x - b.x, a.y - b.y, a.z - b.z}; }
 VINL vf v3_dot(v3 a, v3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 VINL v3 v3_cross(v3 a, v3 b) { return (v3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+VINL v3 v3_add(v3 a, v3 b) { return (v3){a.x + b.x, a.y + b.y, a.z + b.z}; }
+VINL v3 v3_select(vm m, v3 yes, v3 no) { return (v3){vf_select(m, yes.x, no.x), vf_select(m, yes.y, no.y), vf_select(m, yes.z, no.z)}; }
 VINL v3 v3_scale(v3 a, vf s) { return (v3){a.x * s, a.y * s, a.z * s}; }
 VINL v3 v3_bound_by(v3 a, float bound)
 {
@@ -83,6 +85,38 @@ VINL v3 by_upper(const float m[9], v3 a)
 {
     return (v3){vf_set1(m[0]) * a.x + vf_set1(m[3]) * a.y + vf_set1(m[6]) * a.z, vf_set1(m[4]) * a.y + vf_set1(m[7]) * a.z, vf_set1(m[8]) * a.z};
 }
+/* Eight nodes. */
+typedef struct nodes8 {
+    v3 centre, axis;
+    vf radius, sine, slab, cosine;
+} nodes8;
+VINL nodes8 load_nodes(const es_node_columns* c, size_t first, uint32_t n)
+{
+    return (nodes8){
+        {load_floats(c->of[ES_NODE_X] + first, n), load_floats(c->of[ES_NODE_Y] + first, n), load_floats(c->of[ES_NODE_Z] + first, n)},
+        {load_floats(c->of[ES_NODE_AXIS_X] + first, n), load_floats(c->of[ES_NODE_AXIS_Y] + first, n), load_floats(c->of[ES_NODE_AXIS_Z] + first, n)},
+        load_floats(c->of[ES_NODE_RADIUS] + first, n), load_floats(c->of[ES_NODE_SINE] + first, n), load_floats(c->of[ES_NODE_SLAB] + first, n),
+        load_floats(c->of[ES_NODE_COSINE] + first, n)};
+}
+VINL void store_nodes(const es_node_columns* c, size_t first, uint32_t n, nodes8 node)
+{
+    store_floats(c->of[ES_NODE_X] + first, n, node.centre.x);
+    store_floats(c->of[ES_NODE_Y] + first, n, node.centre.y);
+    store_floats(c->of[ES_NODE_Z] + first, n, node.centre.z);
+    store_floats(c->of[ES_NODE_RADIUS] + first, n, node.radius);
+    store_floats(c->of[ES_NODE_AXIS_X] + first, n, node.axis.x);
+    store_floats(c->of[ES_NODE_AXIS_Y] + first, n, node.axis.y);
+    store_floats(c->of[ES_NODE_AXIS_Z] + first, n, node.axis.z);
+    store_floats(c->of[ES_NODE_SINE] + first, n, node.sine);
+    store_floats(c->of[ES_NODE_SLAB] + first, n, node.slab);
+    store_floats(c->of[ES_NODE_COSINE] + first, n, node.cosine);
+}
+VINL nodes8 select_nodes(vm m, nodes8 yes, nodes8 no)
+{
+    return (nodes8){v3_select(m, yes.centre, no.centre), v3_select(m, yes.axis, no.axis), vf_select(m, yes.radius, no.radius), vf_select(m, yes.sine, no.sine),
+        vf_select(m, yes.slab, no.slab), vf_select(m, yes.cosine, no.cosine)};
+}
+
 /* Vertices are bound so that they are within ±ES_POINT_FARTHEST after u, too. */
 VINL float bound_before(const float u[9])
 {
@@ -196,151 +230,220 @@ void ES_KERNEL(es_gi_forest_leaves)(const es_leaf_job* job, uint32_t begin, uint
         const vf g11 = v3_dot(t1, t1), g22 = v3_dot(t2, t2), g12 = v3_dot(t1, t2), difference = g11 - g22;
         const vf larger = vf_set1(0.5f) * (g11 + g22 + vf_sqrt(vf_min(difference * difference + vf_set1(4.0f) * (g12 * g12), vf_set1(1e37f))));
         const vf radius = vf_sqrt(vf_min(vf_min(larger, vf_set1(ES_POINT_STRETCH) * circle), vf_set1(1e18f)));
-        const vf node[ES_NODE_COLUMNS] = {p.x, p.y, p.z, vf_select(hole, vf_set1(-1.0f), radius), normal.x, normal.y, normal.z, vf_zero(), vf_zero()};
+        const vf node[ES_NODE_COLUMNS] = {p.x, p.y, p.z, vf_select(hole, vf_set1(-1.0f), radius), normal.x, normal.y, normal.z, vf_zero(), vf_zero(), one};
         for (int k = 0; k < ES_NODE_COLUMNS; k++) store_floats(job->columns.of[k] + job->first + (i - begin), n, node[k]);
         store_floats(job->area + i, n, vf_select(hole, vf_zero(), vf_min(circle * vf_set1(3.14159265f / (ES_POINT_OVERLAP * ES_POINT_OVERLAP)), vf_set1(1e18f))));
     }
 }
 
 /* The smallest cone about two, of half angles below 90°: its axis is turned by (θ + α2 - α1) / 2 from the first's to the second's, θ being the angle between
- * them, and its half angle is (θ + α1 + α2) / 2. Halves by sin(x / 2) = sin x / √(2 + 2 cos x), which keeps small angles. */
-VINL void merge_cones(const v3 axis1, vf s1, const v3 axis2, vf s2, v3* axis, vf* sine)
+ * them, and its half angle is (θ + α1 + α2) / 2. Halves by sin(x / 2) = sin x / √(2 + 2 cos x), which keeps small angles. turned: sines of the angles
+ * between its axis and theirs. */
+VINL void merge_cones(const nodes8* l, const nodes8* r, nodes8* node, vf turned[2])
 {
     const vf one = vf_set1(1.0f), two = vf_set1(2.0f);
-    const vm any = vm_gt(s1, one) | vm_gt(s2, one);
-    const vf k1 = vf_min(s1, one), k2 = vf_min(s2, one);
-    const vf c1 = vf_sqrt(vf_max(one - k1 * k1, vf_zero())), c2 = vf_sqrt(vf_max(one - k2 * k2, vf_zero()));
-    const v3 across = v3_cross(axis1, axis2);
-    const vf st = vf_sqrt(v3_dot(across, across)), ct = vf_max(vf_min(v3_dot(axis1, axis2), one), vf_set1(-1.0f));
+    const vf k1 = l->sine, k2 = r->sine, c1 = l->cosine, c2 = r->cosine;
+    const v3 across = v3_cross(l->axis, r->axis);
+    const vf st = vf_sqrt(v3_dot(across, across)), ct = vf_max(vf_min(v3_dot(l->axis, r->axis), one), vf_set1(-1.0f));
     /* θ + α2 - α1, θ + α1 - α2 and θ + α1 + α2 */
     const vf sd = k2 * c1 - c2 * k1, cd = c2 * c1 + k2 * k1;
     const vf s21 = st * cd + ct * sd, c21 = ct * cd - st * sd, s12 = st * cd - ct * sd, c12 = ct * cd + st * sd;
     const vf ss = k1 * c2 + c1 * k2, cs = c1 * c2 - k1 * k2, s = st * cs + ct * ss, c = ct * cs - st * ss;
     const vm first = vm_le(s21, vf_zero()) & vm_gt(c21, vf_zero()), second = vm_le(s12, vf_zero()) & vm_gt(c12, vf_zero());
-    const vf half = s / vf_sqrt(vf_max(two + two * c, vf_set1(1e-6f)));
-    /* 180° and more: the sine is no longer positive, and from 270° on the axes are more than 90° apart */
-    const vm wide = any | (vm_le(s, vf_zero()) & (vm_lt(c, vf_zero()) | vm_lt(ct, vf_zero()))) | vm_lt(c, vf_set1(-0.99f));
-    /* the turn's sine and cosine */
-    const vf root = vf_sqrt(vf_max(two + two * c21, vf_set1(1e-6f))), st_turn = s21 / root, ct_turn = vf_set1(0.5f) * root;
-    const vf share = st_turn / vf_max(st, vf_set1(1e-12f));
+    /* 180° and more: the sine is no longer positive, and from 270° on the axes are more than 90° apart; what is not much less counts as well, so that axes that are
+     * summed are at least 8° from opposite */
+    const vm wide = vm_gt(vf_max(k1, k2), one) | (vm_le(s, vf_zero()) & (vm_lt(c, vf_zero()) | vm_lt(ct, vf_zero()))) | vm_lt(c, vf_set1(-0.99f));
+    /* one division for three: by √(2 + 2 cos) of the angle and of the turn, and by sin θ */
+    const vf root = vf_sqrt(vf_max(two + two * c, vf_set1(1e-6f))), root21 = vf_sqrt(vf_max(two + two * c21, vf_set1(1e-6f))), st_least = vf_max(st, vf_set1(1e-12f));
+    const vf root21_st = root21 * st_least, inverse = one / (root * root21_st);
+    const vf half = s * root21_st * inverse, share = s21 * root * inverse;
+    const vf ct_turn = vf_set1(0.5f) * root21, st_turn = share * st_least;
     const vm together = vm_lt(st, vf_set1(1e-6f));
     const vf share2 = vf_select(together, vf_zero(), share), share1 = vf_select(together, one, ct_turn - ct * share);
-    v3 a = {axis1.x * share1 + axis2.x * share2, axis1.y * share1 + axis2.y * share2, axis1.z * share1 + axis2.z * share2};
-    a.x = vf_select(first, axis1.x, vf_select(second, axis2.x, a.x));
-    a.y = vf_select(first, axis1.y, vf_select(second, axis2.y, a.y));
-    a.z = vf_select(first, axis1.z, vf_select(second, axis2.z, a.z));
-    const vf square = v3_dot(a, a);
-    const vm lost = vm_lt(square, vf_set1(1e-12f)); /* opposite axes: any way */
-    const vf scale = one / vf_sqrt(vf_select(lost, one, square));
-    axis->x = vf_select(lost, axis1.x, a.x * scale);
-    axis->y = vf_select(lost, axis1.y, a.y * scale);
-    axis->z = vf_select(lost, axis1.z, a.z * scale);
+    const v3 turn = v3_add(v3_scale(l->axis, share1), v3_scale(r->axis, share2));
+    const v3 axis = v3_scale(turn, vf_set1(1.5f) - vf_set1(0.5f) * v3_dot(turn, turn)); /* it is of unit length but for rounding */
+    node->axis = v3_select(first | wide, l->axis, v3_select(second, r->axis, axis));
+    turned[0] = vf_select(first, vf_zero(), vf_select(second, st, st_turn));
+    turned[1] = vf_select(first, st, vf_select(second, vf_zero(), vf_max(st * ct_turn - ct * st_turn, vf_zero())));
     /* rounding: of sines and cosines about 1e-6 */
     const vf grown = vf_max(half, vf_max(k1, k2)) * vf_set1(1.0f + 4e-6f) + vf_set1(2e-6f);
-    *sine = vf_select(first, k1, vf_select(second, k2, grown));
-    *sine = vf_select(wide | lost | vm_gt(*sine, one), two, *sine);
+    const vf sine = vf_select(first, k1, vf_select(second, k2, grown));
+    node->sine = vf_select(wide | vm_gt(sine, one), two, sine);
 }
 
-/* How far from the plane through `centre` across `axis` leaves' centres of a child may be, its own being within its slab and its sphere. */
-VINL vf reach_across(const vf centre[3], v3 axis, const vf child[ES_NODE_COLUMNS])
+/* The same about two directions: its axis is their mean. */
+VINL void merge_axes(const nodes8* l, const nodes8* r, nodes8* node)
 {
-    const v3 own = {child[4], child[5], child[6]}, way = {child[0] - centre[0], child[1] - centre[1], child[2] - centre[2]}, across = v3_cross(axis, own);
-    const vf turned = vf_sqrt(v3_dot(across, across));
-    return vf_abs(v3_dot(way, axis)) + vf_min(child[ES_NODE_SLAB] + child[ES_NODE_RADIUS] * turned, child[ES_NODE_RADIUS]);
+    const vf one = vf_set1(1.0f);
+    const v3 sum = v3_add(l->axis, r->axis), way = v3_sub(r->axis, l->axis);
+    const vf square = v3_dot(sum, sum), apart = v3_dot(way, way);
+    const vm wide = vm_lt(square, vf_set1(0.02f)), same = vm_le(apart, vf_zero());
+    node->axis = v3_select(wide | same, l->axis, v3_scale(sum, one / vf_sqrt(vf_max(square, vf_set1(0.01f)))));
+    const vf sine = vf_sqrt(apart) * vf_set1(0.5f * (1.0f + 4e-6f)) + vf_set1(2e-6f);
+    node->sine = vf_select(same, vf_zero(), vf_select(wide | vm_gt(sine, one), vf_set1(2.0f), sine));
 }
 
-/* The level of `level` nodes, from their children: sphere, cone, slab and area (of the level's first, and of its children's first). *sum is the sum of their
- * squared radii. */
-void ES_KERNEL(es_gi_forest_merge)(const es_node_columns* columns, uint32_t level, const float* child_area, float* area, float* sum)
+/* How far from the plane through a node's centre across its axis leaves' centres of a child may be, its own being within its slab and its sphere. */
+VINL vf reach_across(const nodes8* node, const nodes8* child, vf turned)
+{
+    return vf_abs(v3_dot(v3_sub(child->centre, node->centre), node->axis)) + vf_min(child->slab + child->radius * turned, child->radius);
+}
+
+VINL nodes8 merge_nodes(nodes8 l, nodes8 r, bool leaves)
+{
+    nodes8 node;
+    const vm no_left = vm_lt(l.radius, vf_zero()), no_right = vm_lt(r.radius, vf_zero());
+    if (vm_any(no_left | no_right)) { /* then it is the other */
+        l = select_nodes(no_left, r, l);
+        r = select_nodes(no_right, l, r);
+    }
+    const v3 way = v3_sub(r.centre, l.centre);
+    const vf distance = vf_sqrt(v3_dot(way, way)), radius = vf_set1(0.5f) * (distance + l.radius + r.radius);
+    const vm in_left = vm_le(distance + r.radius, l.radius), in_right = vm_le(distance + l.radius, r.radius);
+    const vf share = vf_min(vf_max((radius - l.radius) / vf_max(distance, vf_set1(1e-30f)), vf_zero()), vf_set1(1.0f));
+    node.centre = v3_select(in_left, l.centre, v3_select(in_right, r.centre, v3_add(l.centre, v3_scale(way, share))));
+    /* rounding of the centre and of the sum */
+    const vf grown = radius * vf_set1(1.0f + 1e-6f) + vf_set1(2e-7f) * (vf_abs(node.centre.x) + vf_abs(node.centre.y) + vf_abs(node.centre.z));
+    node.radius = vf_select(in_left, l.radius, vf_select(in_right, r.radius, grown));
+    vf slab;
+    if (leaves) { /* flat, and in their own planes */
+        merge_axes(&l, &r, &node);
+        slab = vf_max(vf_abs(v3_dot(v3_sub(l.centre, node.centre), node.axis)), vf_abs(v3_dot(v3_sub(r.centre, node.centre), node.axis)));
+    } else {
+        vf turned[2];
+        merge_cones(&l, &r, &node, turned);
+        slab = vf_max(reach_across(&node, &l, turned[0]), reach_across(&node, &r, turned[1]));
+    }
+    node.cosine = vf_sqrt(vf_max(vf_set1(1.0f) - node.sine * node.sine, vf_zero()));
+    /* rounding of angles */
+    slab = slab * vf_set1(1.0f + 1e-6f) + node.radius * vf_set1(5e-7f);
+    node.slab = vf_min(vf_select(vm_gt(node.sine, vf_set1(1.0f)), node.radius, slab), node.radius);
+    return node;
+}
+
+/* Nodes [i, i + n) of a level; their squared radii. */
+VINL vf merge_some(const es_node_columns* c, uint32_t level, uint32_t i, uint32_t n, bool leaves, const float* child_area, float* area)
+{
+    const size_t child = 2 * (size_t)(level + i);
+    nodes8 l, r;
+    vf left_area, right_area;
+    load_pairs(c->of[ES_NODE_X] + child, n, &l.centre.x, &r.centre.x);
+    load_pairs(c->of[ES_NODE_Y] + child, n, &l.centre.y, &r.centre.y);
+    load_pairs(c->of[ES_NODE_Z] + child, n, &l.centre.z, &r.centre.z);
+    load_pairs(c->of[ES_NODE_RADIUS] + child, n, &l.radius, &r.radius);
+    load_pairs(c->of[ES_NODE_AXIS_X] + child, n, &l.axis.x, &r.axis.x);
+    load_pairs(c->of[ES_NODE_AXIS_Y] + child, n, &l.axis.y, &r.axis.y);
+    load_pairs(c->of[ES_NODE_AXIS_Z] + child, n, &l.axis.z, &r.axis.z);
+    l.sine = r.sine = l.slab = r.slab = vf_zero();
+    l.cosine = r.cosine = vf_set1(1.0f);
+    if (!leaves) {
+        load_pairs(c->of[ES_NODE_SINE] + child, n, &l.sine, &r.sine);
+        load_pairs(c->of[ES_NODE_SLAB] + child, n, &l.slab, &r.slab);
+        load_pairs(c->of[ES_NODE_COSINE] + child, n, &l.cosine, &r.cosine);
+    }
+    const nodes8 node = merge_nodes(l, r, leaves);
+    store_nodes(c, level + i, n, node);
+    load_pairs(child_area + 2 * (size_t)i, n, &left_area, &right_area);
+    store_floats(area + i, n, left_area + right_area);
+    return vf_and(vm_first((int32_t)n) & vm_gt(node.radius, vf_zero()), node.radius * node.radius);
+}
+
+VINL float merge_level(const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area)
 {
     vf total = vf_zero();
-    for (uint32_t i = 0; i < level; i += VW) {
-        const uint32_t n = lanes_left(i, level);
-        vf l[ES_NODE_COLUMNS], r[ES_NODE_COLUMNS], node[ES_NODE_COLUMNS], left_area, right_area;
-        for (int k = 0; k < ES_NODE_COLUMNS; k++) load_pairs(columns->of[k] + 2 * (size_t)(level + i), n, &l[k], &r[k]);
-        const v3 way = {r[0] - l[0], r[1] - l[1], r[2] - l[2]};
-        const vf distance = vf_sqrt(v3_dot(way, way));
-        const vm no_left = vm_lt(l[3], vf_zero()), no_right = vm_lt(r[3], vf_zero());
-        const vm left = no_right | (~no_left & vm_le(distance + r[3], l[3])), right = ~left & (no_left | vm_le(distance + l[3], r[3]));
-        const vf radius = vf_set1(0.5f) * (distance + l[3] + r[3]);
-        const vf share = vf_min(vf_max((radius - l[3]) / vf_max(distance, vf_set1(1e-30f)), vf_zero()), vf_set1(1.0f));
-        for (int k = 0; k < 3; k++) node[k] = vf_select(left, l[k], vf_select(right, r[k], l[k] + (r[k] - l[k]) * share));
-        /* rounding of the centre and of the sum */
-        const vf grown = radius * vf_set1(1.0f + 1e-6f) + vf_set1(2e-7f) * (vf_abs(node[0]) + vf_abs(node[1]) + vf_abs(node[2]));
-        node[3] = vf_select(left, l[3], vf_select(right, r[3], grown));
-        const v3 axis1 = {l[4], l[5], l[6]}, axis2 = {r[4], r[5], r[6]};
-        v3 axis;
-        vf sine;
-        merge_cones(axis1, l[7], axis2, r[7], &axis, &sine);
-        node[4] = vf_select(no_right, axis1.x, vf_select(no_left, axis2.x, axis.x));
-        node[5] = vf_select(no_right, axis1.y, vf_select(no_left, axis2.y, axis.y));
-        node[6] = vf_select(no_right, axis1.z, vf_select(no_left, axis2.z, axis.z));
-        node[7] = vf_select(no_right, l[7], vf_select(no_left, r[7], sine));
-        vf slab = vf_max(reach_across(node, axis, l), reach_across(node, axis, r)) * vf_set1(1.0f + 1e-6f);
-        slab = vf_min(vf_select(vm_gt(sine, vf_set1(1.0f)), node[3], slab), node[3]);
-        node[8] = vf_select(no_right, l[8], vf_select(no_left, r[8], slab));
-        total = total + vf_and(vm_first((int32_t)n) & vm_gt(node[3], vf_zero()), node[3] * node[3]);
-        for (int k = 0; k < ES_NODE_COLUMNS; k++) store_floats(columns->of[k] + level + i, n, node[k]);
-        load_pairs(child_area + 2 * (size_t)i, n, &left_area, &right_area);
-        store_floats(area + i, n, left_area + right_area);
-    }
-    *sum = vf_sum(total);
+    uint32_t i = 0;
+    for (; i + VW <= level; i += VW) total = total + merge_some(columns, level, i, VW, leaves, child_area, area);
+    if (i < level) total = total + merge_some(columns, level, i, level - i, leaves, child_area, area);
+    return vf_sum(total);
 }
 
-/* `count` nodes of the columns from `first` on. */
-void ES_KERNEL(es_gi_forest_quantise)(const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, es_point_node* nodes)
+/* The level of `level` nodes, from their children, which may be leaves: sphere, cone, slab and area (of the level's first, and of its children's first). *sum is the sum
+ * of their squared radii. */
+void ES_KERNEL(es_gi_forest_merge)(const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)
+{
+    *sum = leaves ? merge_level(columns, level, true, child_area, area) : merge_level(columns, level, false, child_area, area);
+}
+
+/* s of es_point_node.cone, of a cone about `axis`, which is decoded from the words but not yet of unit length. */
+VINL vi cone_bits(v3 axis, vf sum, const nodes8* node, bool leaves)
+{
+    const vf one = vf_set1(1.0f);
+    const v3 turned = v3_cross(axis, node->axis);
+    const vf turned2 = v3_dot(turned, turned);
+    if (leaves) { /* the turn itself, at most 0.24°: against the squares of (s / 62)² less 1e-6 */
+        const vf length2 = v3_dot(axis, axis);
+        vi s = vi_set1(1);
+        const float step[4] = {1 / 3844.0f - 1e-6f, 4 / 3844.0f - 1e-6f, 9 / 3844.0f - 1e-6f, 16 / 3844.0f - 1e-6f};
+        s = s - vm_gt(turned2, vf_set1(step[0] * step[0]) * length2) - vm_gt(turned2, vf_set1(step[1] * step[1]) * length2);
+        return s - vm_gt(turned2, vf_set1(step[2] * step[2]) * length2) - vm_gt(turned2, vf_set1(step[3] * step[3]) * length2);
+    }
+    /* one over the axis' length is not above its sum by more than the turn */
+    const vf error = vf_sqrt(turned2) * (sum * vf_set1(1.01f)) + vf_set1(1e-6f);
+    const vf whole = vf_min(node->sine, one) + node->cosine * error;
+    /* beyond 90° the sine falls again: α + ε passes it when the cosine of the sum is negative */
+    const vm wide = vm_gt(node->sine, one) | vm_le(node->cosine * (one - error * error), node->sine * error);
+    const vi s = vi_truncate(vf_sqrt(whole) * vf_set1(62.0f * (1.0f + 1e-6f))) + vi_set1(1);
+    return vi_select(wide | vi_gt(s, vi_set1(62)), vi_set1(63), s);
+}
+
+typedef struct rounding { vf low[3], inverse[3], per_radius, error; } rounding;
+
+VINL void quantise_some(const rounding* by, const es_node_columns* columns, size_t first, uint32_t n, bool leaves, es_point_node* nodes)
 {
     const vf one = vf_set1(1.0f), most = vf_set1(65535.0f);
-    vf inverse[3];
-    for (int k = 0; k < 3; k++) inverse[k] = vf_set1(frame->step[k] > 0.0f ? 1.0f / frame->step[k] : 0.0f);
-    const vf per_radius = vf_set1(frame->radius_step > 0.0f ? 1.0f / frame->radius_step : 0.0f), error = vf_set1(frame->error);
-    for (uint32_t i = 0; i < count; i += VW) {
-        const uint32_t n = lanes_left(i, count);
-        vf node[ES_NODE_COLUMNS];
-        for (int k = 0; k < ES_NODE_COLUMNS; k++) node[k] = load_floats(columns->of[k] + first + i, n);
-        vi q[3];
-        for (int k = 0; k < 3; k++) q[k] = vi_round(vf_min(vf_max((node[k] - vf_set1(frame->low[k])) * inverse[k], vf_zero()), most));
-        const vm absent = vm_lt(node[3], vf_zero());
-        vi radius = vi_truncate(vf_min(vf_max((node[3] + error) * per_radius * vf_set1(1.0f + 1e-6f), vf_zero()), most)) + vi_set1(1);
-        radius = vi_select(absent, vi_zero(), vi_min(radius, vi_set1(65535)));
+    const nodes8 node = load_nodes(columns, first, n);
+    const vi x = vi_round(vf_min(vf_max((node.centre.x - by->low[0]) * by->inverse[0], vf_zero()), most));
+    const vi y = vi_round(vf_min(vf_max((node.centre.y - by->low[1]) * by->inverse[1], vf_zero()), most));
+    const vi z = vi_round(vf_min(vf_max((node.centre.z - by->low[2]) * by->inverse[2], vf_zero()), most));
+    const vm absent = vm_lt(node.radius, vf_zero());
+    const vi radius = ~absent & vi_min(vi_truncate(vf_min((node.radius + by->error) * by->per_radius, most)) + vi_set1(1), vi_set1(65535));
 
-        const vf norm = one / vf_max(vf_abs(node[4]) + vf_abs(node[5]) + vf_abs(node[6]), vf_set1(1e-30f));
-        const vf px = node[4] * norm, py = node[5] * norm;
-        const vm below = vm_lt(node[6], vf_zero());
-        const vf ox = vf_select(below, vf_copysign(one - vf_abs(py), px), px), oy = vf_select(below, vf_copysign(one - vf_abs(px), py), py);
-        const vi qx = vi_round(ox * vf_set1(511.0f)) + vi_set1(512);
-        const vi qy = vi_round(oy * vf_set1(511.0f)) + vi_set1(512);
-        v3 axis = {vf_from_int(qx - vi_set1(512)) * vf_set1(1.0f / 511.0f), vf_from_int(qy - vi_set1(512)) * vf_set1(1.0f / 511.0f), vf_zero()};
-        axis.z = one - vf_abs(axis.x) - vf_abs(axis.y);
-        const vf fold = vf_max(vf_neg(axis.z), vf_zero());
-        axis.x = axis.x - vf_copysign(fold, axis.x);
-        axis.y = axis.y - vf_copysign(fold, axis.y);
-        axis = v3_scale(axis, one / vf_sqrt(v3_dot(axis, axis)));
-        const v3 turned = v3_cross(axis, (v3){node[4], node[5], node[6]});
-        const vf error = vf_sqrt(v3_dot(turned, turned)) + vf_set1(1e-6f), sine = vf_min(node[7], one);
-        const vf whole = sine * vf_sqrt(vf_max(one - error * error, vf_zero())) + vf_sqrt(vf_max(one - sine * sine, vf_zero())) * error;
-        /* beyond 90° the sine falls again: α + ε passes it when the cosine of the sum is negative */
-        const vf cosine = vf_sqrt(vf_max(one - sine * sine, vf_zero())) * vf_sqrt(vf_max(one - error * error, vf_zero())) - sine * error;
-        vi cone = vi_truncate(vf_sqrt(vf_max(whole, vf_zero())) * vf_set1(62.0f * (1.0f + 1e-6f))) + vi_set1(1);
-        cone = vi_select(vm_gt(node[7], one) | vm_le(cosine, vf_zero()) | vi_gt(cone, vi_set1(62)), vi_set1(63), cone);
+    /* one division for two */
+    const vf radius_least = vf_max(node.radius, vf_set1(1e-30f)), sum = vf_max(vf_abs(node.axis.x) + vf_abs(node.axis.y) + vf_abs(node.axis.z), vf_set1(0.5f));
+    const vf both = one / (leaves ? sum : sum * radius_least), norm = leaves ? both : both * radius_least;
+    const vf px = node.axis.x * norm, py = node.axis.y * norm;
+    const vm below = vm_lt(node.axis.z, vf_zero());
+    const vf ox = vf_select(below, vf_copysign(one - vf_abs(py), px), px), oy = vf_select(below, vf_copysign(one - vf_abs(px), py), py);
+    const vi qx = vi_round(ox * vf_set1(511.0f)), qy = vi_round(oy * vf_set1(511.0f));
+    v3 axis = {vf_from_int(qx) * vf_set1(1.0f / 511.0f), vf_from_int(qy) * vf_set1(1.0f / 511.0f), vf_zero()};
+    axis.z = one - vf_abs(axis.x) - vf_abs(axis.y);
+    const vf fold = vf_max(vf_neg(axis.z), vf_zero());
+    axis.x = axis.x - vf_copysign(fold, axis.x);
+    axis.y = axis.y - vf_copysign(fold, axis.y);
+    vi cone = (qx + vi_set1(512)) | (qy + vi_set1(512)) << 10 | cone_bits(axis, sum, &node, leaves) << 20;
+    if (!leaves) {
         /* rounding of what is flat is none */
-        vi thickness = vi_truncate(vf_min(node[8] / vf_max(node[3], vf_set1(1e-30f)), one) * vf_set1(63.0f * (1.0f - 1e-6f))) + vi_set1(1);
-        thickness = vi_select(vm_le(node[8], node[3] * vf_set1(ES_POINT_FLAT)) | absent, vi_zero(), thickness);
-
-        /* records of four words; their light is left as it is */
-        if (n == VW) {
-            vi w[4];
-            vi_gather4(nodes + i, 16, vi_iota(), &w[0], &w[1], &w[2], &w[3]);
-            vf_store4((float*)(nodes + i), vf_from_bits(q[0] | q[1] << 16), vf_from_bits(q[2] | radius << 16), vf_from_bits(qx | qy << 10 | cone << 20 | thickness << 26), vf_from_bits(w[3]));
-        } else {
-            uint32_t words[3][VW];
-            vi_store(words[0], q[0] | q[1] << 16);
-            vi_store(words[1], q[2] | radius << 16);
-            vi_store(words[2], qx | qy << 10 | cone << 20 | thickness << 26);
-            for (uint32_t k = 0; k < n; k++)
-                for (int w = 0; w < 3; w++) memcpy((char*)(nodes + i + k) + 4 * w, &words[w][k], 4);
-        }
+        const vi thickness = vi_truncate(vf_min(node.slab * (both * sum), one) * vf_set1(63.0f * (1.0f - 1e-6f))) + vi_set1(1);
+        cone = cone | (~vm_le(node.slab, node.radius * vf_set1(ES_POINT_FLAT)) & ~absent & thickness) << 26;
     }
+
+    /* records of four words; their light is left as it is */
+    const vi words[3] = {x | y << 16, z | radius << 16, cone};
+    if (n == VW) {
+        vf_store3((float*)nodes, vf_from_bits(words[0]), vf_from_bits(words[1]), vf_from_bits(words[2]));
+        return;
+    }
+    for (uint32_t k = 0; k < n; k++)
+        for (int w = 0; w < 3; w++) memcpy((char*)(nodes + k) + 4 * w, (const char*)&words[w] + 4 * k, 4);
+}
+
+VINL void quantise(const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)
+{
+    rounding by = {.per_radius = vf_set1(frame->radius_step > 0.0f ? 1.0f / frame->radius_step * (1.0f + 1e-6f) : 0.0f), .error = vf_set1(frame->error)};
+    for (int k = 0; k < 3; k++) {
+        by.inverse[k] = vf_set1(frame->step[k] > 0.0f ? 1.0f / frame->step[k] : 0.0f);
+        by.low[k] = vf_set1(frame->low[k]);
+    }
+    uint32_t i = 0;
+    for (; i + VW <= count; i += VW) quantise_some(&by, columns, first + i, VW, leaves, nodes + i);
+    if (i < count) quantise_some(&by, columns, first + i, count - i, leaves, nodes + i);
+}
+
+/* `count` nodes of the columns from `first` on, all of them leaves or none. */
+void ES_KERNEL(es_gi_forest_quantise)(const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)
+{
+    if (leaves) quantise(frame, columns, first, count, true, nodes);
+    else quantise(frame, columns, first, count, false, nodes);
 }
 
 /* Light of parents [begin, end) from their children's, by area. */

@@ -16,7 +16,7 @@
 typedef struct es_forest_source {
     const es_raster_mesh* mesh;
     uint32_t id, triangle_count, vertex_count;
-    uint64_t revision, rest;       /* rest: hash of the pose at rest and its triangles */
+    uint64_t revision, rest_revision, rest; /* rest: hash of the pose at rest and its triangles */
     es_mat4 transform;
     es_point_pose pose;
     double area;                   /* m² / scale²: at rest, in the space of the pose's shape */
@@ -58,11 +58,11 @@ static es_result examine(es_context* context, es_forest_source* source, const es
 {
     const es_raster_mesh* mesh = instance->mesh;
     *source = (es_forest_source){.mesh = mesh, .id = instance->id, .triangle_count = mesh->triangle_count, .vertex_count = mesh->vertex_count,
-        .revision = mesh->revision, .transform = instance->transform};
+        .revision = mesh->revision, .rest_revision = mesh->rest_revision, .transform = instance->transform};
     if (before && memcmp(&before->transform, &source->transform, sizeof source->transform) == 0) source->pose = before->pose;
     else source->pose = es_point_pose_of(&instance->transform);
     const bool same = before && before->mesh == mesh && before->triangle_count == mesh->triangle_count && before->vertex_count == mesh->vertex_count;
-    if (same && before->revision == mesh->revision) source->rest = before->rest;
+    if (same && (before->revision == mesh->revision || (mesh->rest_revision && before->rest_revision == mesh->rest_revision))) source->rest = before->rest;
     else {
         const float* positions = mesh->rest_positions ? mesh->rest_positions : mesh->positions;
         const uint64_t parts[2] = {hash_large(context, positions, 16 * (size_t)mesh->vertex_count), hash_large(context, mesh->indices, 12 * (size_t)mesh->triangle_count)};
@@ -301,7 +301,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
     next.top.instance = UINT32_MAX;
     next.top.rotation[0] = next.top.rotation[4] = next.top.rotation[8] = 1.0f;
     own.upper_count = 2 * (own.task_count + next.top.leaf_count);
-    own.scratch_count = 2 * ES_TREE_BLOCK * (size_t)es_context_workers(context);
+    own.scratch_count = ES_TREE_SCRATCH * (size_t)es_context_workers(context);
     if (!next.tree_count) {
         free_arrays(context, forest);
         forest->own->floats = floats;

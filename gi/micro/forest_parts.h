@@ -8,7 +8,7 @@
 /* ---- for the kernels ------------------------------------------------------------------------------------------------------------------ */
 
 /* Nodes of a complete tree in columns, as in a heap: node 1 is the root, node i has children 2i and 2i + 1. */
-enum { ES_NODE_X, ES_NODE_Y, ES_NODE_Z, ES_NODE_RADIUS, ES_NODE_AXIS_X, ES_NODE_AXIS_Y, ES_NODE_AXIS_Z, ES_NODE_SINE, ES_NODE_SLAB, ES_NODE_COLUMNS };
+enum { ES_NODE_X, ES_NODE_Y, ES_NODE_Z, ES_NODE_RADIUS, ES_NODE_AXIS_X, ES_NODE_AXIS_Y, ES_NODE_AXIS_Z, ES_NODE_SINE, ES_NODE_SLAB, ES_NODE_COSINE, ES_NODE_COLUMNS };
 typedef struct es_node_columns { float* of[ES_NODE_COLUMNS]; } es_node_columns;
 
 /* A disc's shape follows its triangle. With u = b - a, v = c - a of the triangle as it is now, its axes are
@@ -106,6 +106,7 @@ void es_tree_split_any(es_split_point* points, uint32_t count);
 /* ---- nodes ------------------------------------------------------------------------------------------------------------------------------------- */
 
 enum { ES_TREE_BLOCK = 2048 };  /* leaves that one task takes with all nodes above them; a power of two */
+enum { ES_TREE_SCRATCH = 2 * ES_TREE_BLOCK + 16 }; /* of a column; not a power of two, whose multiples would share sets of the cache */
 
 /* The block-th ES_TREE_BLOCK leaves of a tree, or all, if it has fewer. */
 typedef struct es_tree_task {
@@ -145,7 +146,7 @@ struct es_forest_private {
     size_t task_count;
     es_node_columns upper;      /* nodes above blocks, of all trees, and those of the tree of trees */
     size_t upper_count;
-    es_node_columns scratch;    /* nodes of a block for each worker: twice ES_TREE_BLOCK */
+    es_node_columns scratch;    /* nodes of a block for each worker */
     size_t scratch_count;
     bool floats;                /* float nodes are kept */
     uint64_t materials;

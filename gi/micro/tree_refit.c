@@ -66,15 +66,15 @@ static void keep_frame(es_point_tree* tree, const es_node_frame* frame)
 }
 
 /* `count` nodes of the columns from `first` on become those of the tree from `node` on. */
-static void store(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t node, uint32_t count)
+static void store(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t node, uint32_t count, bool leaves)
 {
     es_point_forest* forest = r->forest;
-    r->kernels->forest_quantise(frame, columns, first, count, forest->nodes + tree->first + node);
+    r->kernels->forest_quantise(frame, columns, first, count, leaves, forest->nodes + tree->first + node);
     if (!forest->own->floats) return;
     for (uint32_t i = 0; i < count; i++) {
         es_point_node_float* out = &forest->float_nodes[tree->first + node + i];
-        float* const to[ES_NODE_COLUMNS] = {&out->position[0], &out->position[1], &out->position[2], &out->radius, &out->axis[0], &out->axis[1], &out->axis[2], &out->sine, &out->slab};
-        for (int k = 0; k < ES_NODE_COLUMNS; k++) *to[k] = columns->of[k][first + i];
+        float* const to[ES_NODE_COSINE] = {&out->position[0], &out->position[1], &out->position[2], &out->radius, &out->axis[0], &out->axis[1], &out->axis[2], &out->sine, &out->slab};
+        for (int k = 0; k < ES_NODE_COSINE; k++) *to[k] = columns->of[k][first + i];
     }
 }
 
@@ -105,35 +105,57 @@ static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree*
     return job;
 }
 
+/* `levels` from that of `level` nodes down to that of `last`, whose children are in the scratch's columns; part `part` of `parts` of the tree's. */
+static float make_levels(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, const es_node_columns* columns, uint32_t part, uint32_t parts, uint32_t level, uint32_t last)
+{
+    float* area = r->forest->area + tree->first;
+    float sum = 0.0f;
+    for (; level >= last && level; level /= 2) {
+        const uint32_t at = (parts + part) * level;
+        float squares;
+        r->kernels->forest_merge(columns, level, 2 * at >= tree->leaf_count, area + 2 * (size_t)at, area + at, &squares);
+        sum += squares;
+        if (frame) store(r, tree, frame, columns, level, at, level, false);
+    }
+    return sum;
+}
+
+/* A block is made in parts whose columns stay in the first cache, each up to as many nodes as the kernels take at once. */
+enum { PART = 256, PART_ROOTS = 8 };
+
 static void make_block(const refitting* r, es_tree_task* task, const es_point_tree* tree, es_leaf_job* job, const es_node_columns* scratch)
 {
     es_point_forest* forest = r->forest;
     const es_tree_state* state = &forest->own->states[task->tree];
     const uint32_t size = block_size(tree), blocks = blocks_of(tree), begin = task->block * size;
-    float* area = forest->area + tree->first;
+    /* of a tree of one block the frame is known when all else is */
+    const uint32_t part = blocks > 1 ? PART : size, parts = size / part;
+    es_node_frame frame;
+    if (blocks > 1) frame = frame_of(state->low, state->high, r->again ? es_maxf(forest->own->upper.of[ES_NODE_RADIUS][state->upper + 1], 0.0f) : ES_TREE_REACH * diagonal(state));
+    const es_node_frame* known = blocks > 1 && !r->rest ? &frame : NULL;
+    const es_node_columns top = columns_at(scratch, parts > 1 ? 2 * PART : 0);
     job->columns = *scratch;
-    job->first = size;
-    r->kernels->forest_leaves(job, begin, begin + size);
+    job->first = part;
     task->sum = 0.0f;
-    /* the block's level of `level` nodes are the tree's from (blocks + block) level on */
-    for (uint32_t level = size / 2; level; level /= 2) {
-        const uint32_t at = (blocks + task->block) * level;
-        float sum;
-        r->kernels->forest_merge(scratch, level, area + 2 * (size_t)at, area + at, &sum);
-        task->sum += sum;
+    for (uint32_t i = 0; i < parts; i++) {
+        const uint32_t leaf = begin + i * part, number = task->block * parts + i;
+        r->kernels->forest_leaves(job, leaf, leaf + part);
+        if (known) store(r, tree, known, scratch, part, tree->leaf_count + leaf, part, true);
+        task->sum += make_levels(r, tree, known, scratch, number, blocks * parts, part / 2, parts > 1 ? PART_ROOTS : 1);
+        for (int k = 0; k < ES_NODE_COLUMNS && parts > 1; k++) memcpy(top.of[k] + (parts + i) * PART_ROOTS, scratch->of[k] + PART_ROOTS, PART_ROOTS * sizeof(float));
     }
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) forest->own->upper.of[k][state->upper + blocks + task->block] = scratch->of[k][1];
-    if (r->rest) return;
-    es_node_frame frame = frame_of(state->low, state->high, ES_TREE_REACH * diagonal(state));
-    if (blocks == 1 || r->again) frame = frame_of(state->low, state->high, es_maxf(blocks == 1 ? scratch->of[ES_NODE_RADIUS][1] : forest->own->upper.of[ES_NODE_RADIUS][state->upper + 1], 0.0f));
-    for (uint32_t level = size; level; level /= 2) store(r, tree, &frame, scratch, level, (blocks + task->block) * level, level);
+    if (parts > 1) task->sum += make_levels(r, tree, known, &top, task->block, blocks, parts * PART_ROOTS / 2, 1);
+    for (int k = 0; k < ES_NODE_COLUMNS; k++) forest->own->upper.of[k][state->upper + blocks + task->block] = top.of[k][1];
+    if (blocks > 1 || r->rest) return;
+    frame = frame_of(state->low, state->high, es_maxf(scratch->of[ES_NODE_RADIUS][1], 0.0f));
+    for (uint32_t level = size; level; level /= 2) store(r, tree, &frame, scratch, level, level, level, level == size);
 }
 
 static void refit_block(void* user, uint32_t first, uint32_t last, uint32_t worker)
 {
     const refitting* r = user;
     es_point_forest* forest = r->forest;
-    const es_node_columns scratch = columns_at(&forest->own->scratch, 2 * ES_TREE_BLOCK * (size_t)worker);
+    const es_node_columns scratch = columns_at(&forest->own->scratch, ES_TREE_SCRATCH * (size_t)worker);
     for (uint32_t i = first; i < last; i++) {
         es_tree_task* task = &forest->own->tasks[i];
         const es_point_tree* tree = &forest->trees[task->tree];
@@ -178,7 +200,7 @@ static void refit_upper(void* user, uint32_t first, uint32_t last, uint32_t work
         double total = 0.0;
         for (uint32_t level = blocks / 2; level; level /= 2) {
             float sum;
-            r->kernels->forest_merge(&upper, level, area + 2 * (size_t)level, area + level, &sum);
+            r->kernels->forest_merge(&upper, level, false, area + 2 * (size_t)level, area + level, &sum);
             total += (double)sum;
         }
         state->measure = total;
@@ -187,7 +209,7 @@ static void refit_upper(void* user, uint32_t first, uint32_t last, uint32_t work
         state->again = blocks > 1 && radius > guess && !r->again;
         const es_node_frame frame = frame_of(state->low, state->high, blocks == 1 || r->again ? radius : guess);
         keep_frame(tree, &frame);
-        for (uint32_t level = blocks / 2; level; level /= 2) store(r, tree, &frame, &upper, level, level, level);
+        for (uint32_t level = blocks / 2; level; level /= 2) store(r, tree, &frame, &upper, level, level, level, false);
     }
 }
 
@@ -254,7 +276,7 @@ typedef struct standing { const es_gi_kernels* kernels; const es_point_forest* f
 static void stand_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const standing* s = user;
-    const es_node_columns scratch = columns_at(&s->forest->own->scratch, 2 * ES_TREE_BLOCK * (size_t)worker);
+    const es_node_columns scratch = columns_at(&s->forest->own->scratch, ES_TREE_SCRATCH * (size_t)worker);
     es_leaf_job job = leaves_of(s->forest, s->tree, false);
     job.columns = scratch;
     s->kernels->forest_leaves(&job, begin, end);
@@ -298,6 +320,7 @@ static void root_of(const es_point_forest* forest, uint32_t index, float out[ES_
     /* what the rounding of the pose may have moved it */
     out[ES_NODE_RADIUS] = root[ES_NODE_RADIUS] < 0.0f ? -1.0f : root[ES_NODE_RADIUS] * (1.0f + 1e-6f) + reach * 5e-7f;
     out[ES_NODE_SINE] = root[ES_NODE_SINE] > 1.0f ? 2.0f : es_minf(root[ES_NODE_SINE] + 2e-6f, 1.0f);
+    out[ES_NODE_COSINE] = es_sqrt(es_maxf(1.0f - out[ES_NODE_SINE] * out[ES_NODE_SINE], 0.0f));
     out[ES_NODE_SLAB] = es_minf(root[ES_NODE_SLAB] + reach * 5e-7f, es_maxf(out[ES_NODE_RADIUS], 0.0f));
 }
 
@@ -305,7 +328,7 @@ static void top_leaf(const es_point_forest* forest, const es_node_columns* colum
 {
     const es_point_tree* top = &forest->top;
     const uint32_t node = top->leaf_count + slot, index = forest->top_trees[slot];
-    float values[ES_NODE_COLUMNS] = {[ES_NODE_RADIUS] = -1.0f, [ES_NODE_AXIS_Y] = 1.0f};
+    float values[ES_NODE_COLUMNS] = {[ES_NODE_RADIUS] = -1.0f, [ES_NODE_AXIS_Y] = 1.0f, [ES_NODE_COSINE] = 1.0f};
     const size_t root = index == UINT32_MAX ? 0 : forest->trees[index].first + 1;
     if (index != UINT32_MAX) root_of(forest, index, values);
     for (int k = 0; k < ES_NODE_COLUMNS; k++) columns->of[k][node] = values[k];
@@ -339,13 +362,13 @@ void es_forest_refit_top(es_context* context, es_point_forest* forest, es_split_
     float* area = forest->area + top->first;
     for (uint32_t level = top->leaf_count / 2; level; level /= 2) {
         float sum;
-        r.kernels->forest_merge(&columns, level, area + 2 * (size_t)level, area + level, &sum);
+        r.kernels->forest_merge(&columns, level, false, area + 2 * (size_t)level, area + level, &sum);
         r.kernels->forest_blend(&looks, level, 2 * level);
     }
     forest->radius = es_maxf(columns.of[ES_NODE_RADIUS][1], 0.0f);
     const es_node_frame frame = frame_of(low, high, forest->radius);
     keep_frame(top, &frame);
-    store(&r, top, &frame, &columns, 1, 1, 2 * top->leaf_count - 1);
+    store(&r, top, &frame, &columns, 1, 1, 2 * top->leaf_count - 1, false);
 }
 
 /* ---- light ------------------------------------------------------------------------------------------------------------------------ */

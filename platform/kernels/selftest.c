@@ -92,5 +92,10 @@ void ES_KERNEL(es_platform_simd_operations)(const float* pa, const float* pb, co
         PUT(vf_store4_1, vf_load(stored + VW));
         PUT(vf_store4_2, vf_load(stored + 2 * VW));
         PUT(vf_store4_3, vf_load(stored + 3 * VW));
+        vf_store3(stored, b, c, a);
+        PUT(vf_store3_0, vf_load(stored));
+        PUT(vf_store3_1, vf_load(stored + VW));
+        PUT(vf_store3_2, vf_load(stored + 2 * VW));
+        PUT(vf_store3_3, vf_load(stored + 3 * VW));
     }
 }
