@@ -152,6 +152,7 @@ typedef struct es_renderer_settings {
                                       * places in pixels, and neighbours have others; 1: not */
     bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
     bool micro_warp;                 /* a pixel is a direction of the lobe's importance; off: of the cosine's, weighted by the lobe */
+    bool micro_lobes;                /* what lobes of the points reflect of the lights goes where it goes, as a distribution of its own; off: evenly into their hemisphere */
     uint32_t micro_nodes;            /* es_micro_nodes */
     uint32_t micro_light;            /* es_micro_light */
     uint32_t micro_level;            /* VPLS, RADIOSITY: level of the hierarchy that light is found at, and pushed down from */

@@ -61,6 +61,7 @@
     X(forest_quantise, (const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)) \
     X(forest_pull, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_pack, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
+    X(forest_pull_lobes, (const es_node_lobes* lobes, uint32_t begin, uint32_t end))                             \
     X(forest_blend, (const es_node_looks* looks, uint32_t begin, uint32_t end))                                  \
     /* points order[first … first + count), 1 … ES_MICRO_CELL of them */                                         \
     X(micro_gather, (const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* scratch))

@@ -100,8 +100,12 @@ static es_result light_points(es_renderer* r, uint32_t bounces)
 {
     const es_renderer_settings* s = &r->frame.settings;
     if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
+    bool glossy = false;
+    for (uint32_t i = 0; i < r->micro.forest.tree_count && s->micro_lobes; i++) glossy = glossy || r->micro.forest.trees[i].glossy;
+    if (glossy) es_lobe_shapes_fill(r->context, &r->micro.shapes);
     const es_point_light_job direct = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
-        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes};
+        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes,
+        .shapes = glossy ? &r->micro.shapes : NULL};
     es_result result = es_points_light_direct(r->context, &r->micro.forest, &direct);
     es_arena_reset(&r->arena);
     if (!result && bounces > 1) {
@@ -123,7 +127,7 @@ static es_result pass_point_light(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
     es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
-    float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission};
+    float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission, s->micro_lobes};
     es_plan_reads(plan, numbers, sizeof numbers);
     const uint32_t bounces = bounces_of(r);
     if (bounces > 1) {

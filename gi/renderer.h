@@ -26,6 +26,7 @@ typedef struct es_frame_settings { es_renderer_settings settings; float extent; 
 typedef struct es_micro_buffers {
     es_point_forest forest;
     es_lobe_albedo lobes;
+    es_lobe_shapes shapes;
     uint32_t spacing;          /* that the next two have pixels for */
     es_planes sparse_irradiance, sparse_specular;
     es_planes fresh_irradiance, fresh_specular;   /* of this frame alone, where the renderer's are means over several */

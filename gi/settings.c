@@ -61,6 +61,7 @@ static const es_setting renderer_table[] = {
     {"micro.ray-cast", ES_SETTING_BOOL, "true", 0, 1, NULL, "points larger than a pixel are met by rays", AT(micro_ray_cast)},
     {"micro.warp", ES_SETTING_BOOL, "true", 0, 1, NULL, "a micro-buffer's pixels are distributed as the lobe is", AT(micro_warp)},
     {"micro.nodes", ES_SETTING_CHOICE, "quantised", 0, 0, "quantised|float", "nodes of the point hierarchy: of 128 bits, or of floats", AT(micro_nodes)},
+    {"micro.lobes", ES_SETTING_BOOL, "true", 0, 1, NULL, "points send what their lobes reflect of the lights where it goes; off: evenly into their hemisphere", AT(micro_lobes)},
     {"micro.light", ES_SETTING_CHOICE, "vpls", 0, 0, "direct|vpls|radiosity|photons", "what lights the points with more than one bounce: the lights alone, and virtual point lights, and themselves, or photons",
         AT(micro_light)},
     {"micro.level", ES_SETTING_INT, "12", 0, 23, NULL, "micro.light vpls and radiosity: light is found at about 2^level points, the others have it from these", AT(micro_level)},

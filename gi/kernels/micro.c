@@ -13,6 +13,7 @@
 #include "gi/kernel_table.h"
 #include "gi/kernels/micro_cut_simd.h"
 #include "gi/kernels/micro_map_simd.h"
+#include "gi/kernels/node_lobe_simd.h"
 #include "gi/kernels/surface_simd.h"
 #include "raster/pack.h"
 
@@ -226,15 +227,31 @@ VINL vi without_gaps(const es_micro_table* table, const int32_t* pixels, uint32_
 /* Weights of pixels, in place of the sum's own where a lobe's are not distributed as it is. */
 typedef struct unwarped { bool is; es_surface_v surface; vf view[3]; } unwarped;
 
-static void sum_up(const es_micro_job* job, es_micro_scratch* s, const es_micro_rays* rays, uint32_t lane, float f90, const unwarped* lobe, float sums[3])
+/* Adds what nodes of the cut send besides, from their middles to a lane's point. */
+VINL void add_lobes(const es_micro_job* job, const es_micro_cut* cut, const lanes* here, uint32_t lane, vi place, vf light[3])
+{
+    vf c[3], rest;
+    vf_gather4(cut->nodes, sizeof *cut->nodes, place, &c[0], &c[1], &c[2], &rest);
+    vf d[3], square = vf_set1(1e-30f);
+    for (int k = 0; k < 3; k++) {
+        d[k] = vf_set1(here->p[k][lane]) - c[k];
+        square = square + d[k] * d[k];
+    }
+    const vf inverse = vf_set1(1.0f) / vf_sqrt(square);
+    for (int k = 0; k < 3; k++) d[k] = d[k] * inverse;
+    es_node_lobe_add_v(job->forest->lobes, vi_gather(cut->node, place), d, light);
+}
+
+static void sum_up(const es_micro_job* job, es_micro_scratch* s, const es_micro_rays* rays, const lanes* here, uint32_t lane, float f90, const unwarped* lobe, float sums[3])
 {
     const es_micro_table* table = job->table;
     const int32_t* pixels = pixels_of(s, lane);
     vf sum[3] = {vf_zero(), vf_zero(), vf_zero()};
     for (uint32_t at = 0; at < table->stride * table->size; at += VW) {
-        const vi word = vi_gather(s->cut.radiance, without_gaps(table, pixels, at % table->stride, at / table->stride) & vi_set1(0xffff));
+        const vi place = without_gaps(table, pixels, at % table->stride, at / table->stride) & vi_set1(0xffff), word = vi_gather(s->cut.radiance, place);
         vf light[3];
         es_unpack_rgb9e5_v(word, &light[0], &light[1], &light[2]);
+        if (job->forest->lobes) add_lobes(job, &s->cut, here, lane, place, light);
         if (lobe->is) {
             vf pass, weight[3];
             const vf zero = vf_zero();
@@ -263,10 +280,12 @@ static void keep_picture(const es_micro_job* job, es_micro_scratch* s, const es_
             for (int k = 0; k < 3; k++) pixel->direction[k] = here->t[k][lane] * dx + here->b[k][lane] * dy + here->a[k][lane] * dz;
             if (word == EMPTY) continue;
             const vi bits = vi_set1(((word >> 16) + DEPTH_BASE + 32768) << 13);
-            const es_vec3 light = es_unpack_rgb9e5(s->cut.radiance[word & 0xffff]);
+            vf light[3];
+            es_unpack_rgb9e5_v(vi_set1((int32_t)s->cut.radiance[word & 0xffff]), &light[0], &light[1], &light[2]);
+            if (job->forest->lobes) add_lobes(job, &s->cut, here, lane, vi_set1(word & 0xffff), light);
             pixel->node = s->cut.node[word & 0xffff];
             pixel->distance = es_sqrt(vf_from_bits(bits)[0] / job->inverse_square);
-            pixel->radiance[0] = light.x, pixel->radiance[1] = light.y, pixel->radiance[2] = light.z;
+            for (int k = 0; k < 3; k++) pixel->radiance[k] = light[k][0];
         }
 }
 
@@ -358,7 +377,7 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
         const unwarped lobe = mapping == ES_MICRO_COSINE ? unwarped_of(point, &here, i) : (unwarped){.is = false};
         const float f90 = point->kind == ES_GATHER_LOBE ? 0.0f : here.f90[i], nv = es_micro_view_cosine(point), b = 1.0f - nv, b2 = b * b, share = 1.0f / (float)(table->size * table->size);
         float sums[3];
-        sum_up(job, s, &table->rays[jitters[i]], i, f90, &lobe, sums);
+        sum_up(job, s, &table->rays[jitters[i]], &here, i, f90, &lobe, sums);
         for (int k = 0; k < 3; k++) job->result[k][index] = sums[k] * share * (mapping != ES_MICRO_COSINE ? here.total[k][i] : 3.14159265f * (1.0f - f90 * (0.04f + 0.96f * (b2 * b2 * b))));
     }
     if (job->picture) keep_picture(job, s, &table->rays[jitters[count - 1]], &here, count - 1);
@@ -380,6 +399,8 @@ void ES_KERNEL(es_gi_micro_gather)(const es_micro_job* job, uint32_t first, uint
         open *= 4.0f;
     }
     s->cut.radiance[EMPTY & 0xffff] = 0;
+    s->cut.node[EMPTY & 0xffff] = 0; /* where nothing is, which has no lobe */
+    s->cut.nodes[EMPTY & 0xffff] = (es_micro_node){{0}};
     s->stats.drawn += (uint64_t)(s->cut.count + ES_MICRO_MAX_CUT - s->cut.near) * count;
     for (uint32_t i = 0; i < count; i += VW) gather_eight(job, first + i, count - i < VW ? count - i : VW, mapping, open, s);
 }

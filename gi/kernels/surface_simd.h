@@ -33,6 +33,14 @@ VINL es_surface_v es_surface_of_gbuffer_v(vi albedo_rg, vi albedo_b, vi word)
 /* Does a surface of this G-buffer word reflect nothing but what its albedo does, whatever its colour? */
 VINL vm es_surface_word_is_diffuse_v(vi word) { return vi_eq(word & vi_set1(0x00ff00ff), vi_zero()); }
 
+/* es_surface_has_lobe */
+VINL vm es_surface_has_lobe_v(const es_surface_v* s)
+{
+    const vf f0 = vf_max(s->specular[0], vf_max(s->specular[1], s->specular[2])), alpha = s->roughness * s->roughness;
+    const vm phong = vi_eq(s->model, vi_set1(ES_SURFACE_PHONG));
+    return vm_gt(f0, vf_select(phong, vf_zero(), vf_set1(0.4f) * alpha * alpha)) & ~vi_eq(s->model, vi_set1(ES_SURFACE_UNLIT));
+}
+
 VINL void es_surface_parts_v(const es_surface_v* s, vf nx, vf ny, vf nz, vf ix, vf iy, vf iz, vf ox, vf oy, vf oz, vf* pass, vf lobe[3])
 {
     const vf zero = vf_zero(), one = vf_set1(1.0f);

@@ -140,7 +140,7 @@ static void share_out(share* shares, uint32_t count, uint32_t points)
 
 static size_t padded(size_t count) { return (count + 7) / 8 * 8; }
 
-enum { ARRAYS = 24 };
+enum { ARRAYS = 25 };
 typedef struct array { void** pointer; size_t count, size; } array;
 
 static void list_arrays(es_point_forest* f, array out[ARRAYS])
@@ -152,7 +152,7 @@ static void list_arrays(es_point_forest* f, array out[ARRAYS])
         {(void**)&own->tasks, own->task_count, sizeof *own->tasks}, {(void**)&f->top_trees, f->top.leaf_count, sizeof *f->top_trees},
         {(void**)&f->nodes, nodes, sizeof *f->nodes}, {(void**)&f->float_nodes, own->floats ? nodes : 0, sizeof *f->float_nodes}, {(void**)&f->radiance[0], nodes, sizeof(float)},
         {(void**)&f->radiance[1], nodes, sizeof(float)}, {(void**)&f->radiance[2], nodes, sizeof(float)}, {(void**)&f->area, nodes, sizeof(float)},
-        {(void**)&f->albedo, nodes, sizeof(uint32_t)}, {(void**)&f->emission, nodes, sizeof(uint32_t)}, {(void**)&f->x, leaves, sizeof(float)},
+        {(void**)&f->lobes, f->lobes ? nodes : 0, sizeof *f->lobes}, {(void**)&f->albedo, nodes, sizeof(uint32_t)}, {(void**)&f->emission, nodes, sizeof(uint32_t)}, {(void**)&f->x, leaves, sizeof(float)},
         {(void**)&f->y, leaves, sizeof(float)}, {(void**)&f->z, leaves, sizeof(float)}, {(void**)&f->normal, leaves, sizeof(uint32_t)},
         {(void**)&f->albedo_rg, leaves, sizeof(uint32_t)}, {(void**)&f->albedo_b, leaves, sizeof(uint32_t)}, {(void**)&f->surface, leaves, sizeof(uint32_t)},
         {(void**)&f->triangle, leaves, sizeof(uint32_t)}, {(void**)&f->barycentric, leaves, sizeof(uint32_t)}, {(void**)&own->shapes.along, 3 * leaves, sizeof(float)},

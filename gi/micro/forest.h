@@ -34,9 +34,23 @@ typedef struct es_point_node_float {
                                 * around it the radius. By it a wall is known to be invisible from its own plane, whole */
 } es_point_node_float;
 
+/* What a node sends besides its radiance, in one direction more than in others (gi/micro/lobe_shape.h has the distribution p): towards w
+ *     light · p(axis · w) / F,  0 from behind,
+ * F being the mean of the cosine at which the node's area is seen from there. With m = length · (normal · w) and s, the sine of the half angle that normals are
+ * spread by if they are so evenly over a cap,
+ *     F = m or, where m < s, (m + s)² / (4 s), at least ES_LOBE_HORIZON;  s = 2 √(length (1 - length)) or, where length < 1/2, 1; at least 0.02
+ * which of a leaf is n · w, and of a whole sphere 1/4. */
+typedef struct es_point_lobe {
+    uint32_t light;            /* W/m² of the node's area, RGB9E5; 0: there is no lobe */
+    uint32_t axis;             /* world, as the G-buffer has normals: mean direction, by power */
+    uint32_t normal;           /* world, likewise: mean normal, by area */
+    uint32_t shape;            /* bits 0 … 15: √a as unorm; 16 … 30: length of the mean of the unit normals, of 32767; 31: distributed as Phong's lobes are */
+} es_point_lobe;
+
 typedef struct es_point_tree {
     uint32_t instance;         /* of the draw list */
     bool back;                 /* of a double-sided instance's back */
+    bool glossy;               /* some leaf has a lobe worth a direction (es_surface_has_lobe) */
     uint32_t leaf_count;       /* a power of two */
     size_t first;              /* of its nodes in the forest's */
     size_t first_leaf;         /* of its leaves in the forest's: leaf k is node leaf_count + k */
@@ -55,6 +69,7 @@ typedef struct es_point_forest {
     es_point_node* nodes;
     es_point_node_float* float_nodes; /* tree's local space; what the others are rounded from; NULL with es_forest_request.packed_only */
     float* radiance[3];        /* W/(m² sr), the mean over the node's area */
+    es_point_lobe* lobes;      /* of glossy trees and the tree of trees, 0 of others; of what was lit last, as it stood then. NULL: all light is in radiance */
     float* area;               /* m² */
     uint32_t* albedo;          /* RGB9E5: share of the irradiance that is reflected, lobe included, the mean over the area */
     uint32_t* emission;        /* RGB9E5, W/(m² sr), likewise */
@@ -84,7 +99,13 @@ typedef struct es_forest_update {
 es_result es_forest_bring(es_context* context, es_point_forest* forest, const es_draw_list* list, uint64_t materials, const es_forest_request* request, es_forest_update* update);
 void es_forest_free(es_context* context, es_point_forest* forest);
 
-/* Mean light of all inner nodes and of the tree of trees from the leaves' radiance, by area; packs it into the quantised nodes. (§6.4.3's pull) */
+/* Room for lobes, all 0, where there is none; and none. */
+es_result es_forest_keep_lobes(es_context* context, es_point_forest* forest);
+void es_forest_drop_lobes(es_context* context, es_point_forest* forest);
+
+/* Mean light of all inner nodes and of the tree of trees from the leaves' radiance, by area; packs it into the quantised nodes. (§6.4.3's pull) With lobes, theirs:
+ * light by area, axes by its luminance, and a grows by half the variance of what they are spread by, as of microfacets whose normals a map bends (Toksvig 2005;
+ * Han et al. 2007). */
 void es_forest_pull(es_context* context, es_point_forest* forest);
 
 #endif

@@ -48,6 +48,12 @@ typedef struct es_node_light {
     es_point_node* packed;
 } es_node_light;
 
+/* Lobes of a tree's nodes, likewise. */
+typedef struct es_node_lobes {
+    es_point_lobe* lobes;
+    const float* area;
+} es_node_lobes;
+
 /* What a tree's nodes reflect and emit, likewise. */
 typedef struct es_node_looks {
     uint32_t *albedo, *emission;
@@ -154,6 +160,8 @@ struct es_forest_private {
 
 /* Reads the material at a tree's leaves; what inner nodes have is made from it with the nodes (ES_TREE_LOOKS), where it is not the same for all. */
 void es_forest_read_looks(es_context* context, es_point_forest* forest, const es_draw_list* list, uint32_t tree);
+/* es_forest_pull's part of lobes. */
+void es_forest_pull_lobes(es_context* context, es_point_forest* forest);
 /* Does the states' work; with `rest`, measures trees in their pose at rest and nothing else. */
 void es_forest_refit(es_context* context, es_point_forest* forest, bool rest);
 /* Where a tree's leaves are in its own space; points[k].index = k. */

@@ -52,6 +52,11 @@ static void direct(void* user, const es_leaf_range* range, uint32_t worker)
 
 es_result es_points_light_direct(es_context* context, es_point_forest* forest, const es_point_light_job* job)
 {
+    bool glossy = false;
+    for (uint32_t i = 0; i < forest->tree_count && job->shapes && job->view_count; i++) glossy = glossy || forest->trees[i].glossy;
+    if (!glossy) es_forest_drop_lobes(context, forest);
+    es_result result = glossy ? es_forest_keep_lobes(context, forest) : ES_OK;
+    if (result) return result;
     direct_loop loop = {es_gi_kernel_table(es_context_isa(context)), job, forest};
     es_forest_each_leaf(context, forest, direct, &loop);
     return ES_OK;

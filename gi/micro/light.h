@@ -3,14 +3,17 @@
  * A point sends the same radiance into all of its hemisphere. Of irradiance E from a direction whose cosine is c,
  *     radiance = E / pi · (albedo · (1 - Fd(c)) · mean(1 - Fd) + lobe(c)) + emission,
  * albedo, Fd as in gi/surface.h, the mean over directions by their cosine, lobe(c) the directional albedo of the lobe (gi/micro/lobe_albedo.h).
- * So a point sends as much power as its surface would; what is approximated is where to: its lobe is spread over the hemisphere, and so is the
- * interface's shadow at grazing directions. */
+ * So a point sends as much power as its surface would; what is approximated is where to: the interface's shadow at grazing directions is spread over the
+ * hemisphere, and so is the lobe. That is all there is to a lobe that is hardly one; one that es_surface_has_lobe says is worth evaluating is kept apart, if the job has shapes
+ * for it: E lobe(c) is then the power that goes about the direction which gi/micro/lobe_shape.h has for it. A point has one lobe: of several lights the mean direction by the
+ * luminance of what each brings, and as wide as these lie apart. */
 #ifndef EARTHSHINE_GI_MICRO_LIGHT_H
 #define EARTHSHINE_GI_MICRO_LIGHT_H
 
 #include "gi/light_view.h"
 #include "gi/micro/forest.h"
 #include "gi/micro/lobe_albedo.h"
+#include "gi/micro/lobe_shape.h"
 
 typedef struct es_point_light_job {
     const es_light_view* views;    /* with their shadow maps drawn */
@@ -19,9 +22,10 @@ typedef struct es_point_light_job {
     float shadow_bias, shadow_slope_bias;
     bool emission;                 /* adds what the surfaces glow with */
     const es_lobe_albedo* lobes;   /* filled */
+    const es_lobe_shapes* shapes;  /* filled; NULL: lobes are spread over the hemisphere */
 } es_point_light_job;
 
-/* Sets the radiance of all leaves, not of inner nodes: es_forest_pull does. Leaves are split among the context's threads; what one has does not
+/* Sets the radiance of all leaves, not of inner nodes: es_forest_pull does. So it does lobes, which the forest then has where a tree is glossy and a light on. Leaves are split among the context's threads; what one has does not
  * depend on the others. Surfaces that are unlit only glow. */
 es_result es_points_light_direct(es_context* context, es_point_forest* forest, const es_point_light_job* job);
 

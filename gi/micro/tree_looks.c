@@ -65,9 +65,24 @@ static void note_plain(es_point_forest* forest, uint32_t index)
     }
 }
 
+/* Lobes are there for glossy trees and no others. */
+static void note_glossy(es_context* context, es_point_forest* forest, uint32_t index)
+{
+    es_point_tree* tree = &forest->trees[index];
+    bool glossy = false;
+    for (size_t i = tree->first_leaf; i < tree->first_leaf + tree->leaf_count && !glossy; i++) {
+        if (i > tree->first_leaf && forest->surface[i] == forest->surface[i - 1] && forest->albedo_rg[i] == forest->albedo_rg[i - 1] && forest->albedo_b[i] == forest->albedo_b[i - 1]) continue;
+        const es_surface surface = es_surface_of_gbuffer(forest->albedo_rg[i], forest->albedo_b[i], forest->surface[i]);
+        glossy = es_surface_has_lobe(&surface);
+    }
+    if (glossy != tree->glossy) es_forest_drop_lobes(context, forest);
+    tree->glossy = glossy;
+}
+
 void es_forest_read_looks(es_context* context, es_point_forest* forest, const es_draw_list* list, uint32_t tree)
 {
     reading r = {forest, list, tree};
     es_parallel_for(context, forest->trees[tree].leaf_count, 1024, read_some, &r);
     note_plain(forest, tree);
+    note_glossy(context, forest, tree);
 }

@@ -416,4 +416,5 @@ void es_forest_pull(es_context* context, es_point_forest* forest)
         }
     r.kernels->forest_pack(&top, leaves, 2 * leaves);
     pull_upper(r.kernels, &top, leaves / 2);
+    if (forest->lobes) es_forest_pull_lobes(context, forest);
 }
