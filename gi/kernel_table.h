@@ -62,6 +62,7 @@
     X(forest_pull, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_pack, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_pull_lobes, (const es_node_lobes* lobes, uint32_t begin, uint32_t end))                             \
+    X(widen_lobes, (es_point_lobe* leaves, uint32_t begin, uint32_t end))                                        \
     X(forest_blend, (const es_node_looks* looks, uint32_t begin, uint32_t end))                                  \
     /* points order[first … first + count), 1 … ES_MICRO_CELL of them */                                         \
     X(micro_gather, (const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* scratch))

@@ -15,38 +15,10 @@
 #include "platform/random.h"
 #include "tests/guarded_planes.h"
 #include "tests/hand_forest.h"
-#include "tests/small_worlds.h"
+#include "tests/lit_worlds.h"
 #include "tests/surface_in_double.h"
 
 static es_lobe_albedo lobes;
-
-typedef struct lit_world { small_world w; es_rasterizer* rasterizer; es_light_view* views; uint32_t count; } lit_world;
-
-/* The shadow maps of the world's lights, as a frame has them. */
-static void draw_shadows(lit_world* l, uint32_t size)
-{
-    assert_int_equal(es_world_step(l->w.world, 0), ES_OK);
-    size_t count;
-    const es_light_state* lights = es_world_lights(l->w.world, &count);
-    es_vec3 low, high;
-    assert_true(es_world_bounds(l->w.world, &low, &high));
-    assert_int_equal(es_rasterizer_create(l->w.context, &l->rasterizer), ES_OK);
-    l->views = calloc(count + 1, sizeof *l->views);
-    l->count = (uint32_t)count;
-    es_light_drawn drawn = {0};
-    for (size_t i = 0; i < count; i++) {
-        assert_int_equal(es_light_view_prepare(l->w.context, &l->views[i], &lights[i], (es_light_view_sizes){size, 0, false, false}, low, high), ES_OK);
-        assert_int_equal(es_light_view_draw(l->rasterizer, es_world_draw_list(l->w.world), 0, false, &l->views[i], ES_LIGHT_SHADOW, &drawn), ES_OK);
-    }
-}
-
-static void destroy(lit_world* l)
-{
-    for (uint32_t i = 0; i < l->count; i++) es_light_view_free(l->w.context, &l->views[i]);
-    free(l->views);
-    es_rasterizer_destroy(l->rasterizer);
-    small_world_destroy(&l->w);
-}
 
 static es_point_light_job job_of(const lit_world* l)
 {
@@ -114,7 +86,7 @@ static void test_laws(void** state)
         }
         assert_true(lit >= SIDE * SIDE / 16); /* of 256, in the narrowest cone and the shortest range */
         hand_forest_free(&f);
-        destroy(&l);
+        lit_world_destroy(&l);
     }
 }
 
@@ -149,7 +121,7 @@ static void test_occluder(void** state)
         }
         assert_true(dark > 10 && bright > 40);
         hand_forest_free(&f);
-        destroy(&l);
+        lit_world_destroy(&l);
     }
 }
 
@@ -192,7 +164,7 @@ static void test_no_acne(void** state)
         assert_true(facing > LEAVES / 8);
         if (acne) fail_msg("kind %d: %u of %u leaves shadow themselves", kind, acne, facing);
         hand_forest_free(&f);
-        destroy(&l);
+        lit_world_destroy(&l);
     }
 }
 
@@ -247,7 +219,7 @@ static void test_lobes(void** state)
     }
     printf("largest error of a directional albedo: %.4f\n", worst);
     hand_forest_free(&f);
-    destroy(&l);
+    lit_world_destroy(&l);
 }
 
 /* ---- the same bits ------------------------------------------------------------------------------------------------------------- */
@@ -332,7 +304,7 @@ static void test_same_bits(void** state)
         free(expected);
     }
     hand_forest_free(&f);
-    destroy(&l);
+    lit_world_destroy(&l);
 }
 
 /* ---- little to light ------------------------------------------------------------------------------------------------------------ */
@@ -366,7 +338,7 @@ static void test_little(void** state)
     assert_int_equal(es_points_light_direct(l.w.context, &f, &job), ES_OK);
     for (size_t i = 0; i < f.leaf_count; i++) assert_true(isfinite(leaf_radiance(&f, i, 1)) && leaf_radiance(&f, i, 1) >= 0);
     hand_forest_free(&f);
-    destroy(&l);
+    lit_world_destroy(&l);
 }
 
 /* test_point_light --time: a million leaves, in the order of a curve over the floor, by one spot light. */
@@ -407,7 +379,7 @@ static void time_all(void)
         es_context_destroy(context);
     }
     hand_forest_free(&f);
-    destroy(&l);
+    lit_world_destroy(&l);
 }
 
 int main(int argc, char** argv)

@@ -25,13 +25,18 @@ VINL es_node_lobe_v es_node_lobe_unpack_v(vi light, vi axis, vi normal, vi shape
     return l;
 }
 
+VINL vi es_node_lobe_shape_v(vf width, vf length, vm phong)
+{
+    const vi bits = vi_round(vf_clamp(length, vf_zero(), vf_set1(1.0f)) * vf_set1(32767.0f));
+    return es_pack_unorm16_v(vf_sqrt(width)) | bits << 16 | (phong & vi_set1((int32_t)0x80000000u));
+}
+
 VINL void es_node_lobe_pack_v(const es_node_lobe_v* l, vi words[4])
 {
     words[0] = es_pack_rgb9e5_v(l->light[0], l->light[1], l->light[2]);
     words[1] = es_pack_normal_v(l->axis[0], l->axis[1], l->axis[2]);
     words[2] = es_pack_normal_v(l->normal[0], l->normal[1], l->normal[2]);
-    const vi length = vi_round(vf_clamp(l->length, vf_zero(), vf_set1(1.0f)) * vf_set1(32767.0f));
-    words[3] = es_pack_unorm16_v(vf_sqrt(l->width)) | length << 16 | (l->phong & vi_set1((int32_t)0x80000000u));
+    words[3] = es_node_lobe_shape_v(l->width, l->length, l->phong);
 }
 
 /* Adds to `light`, W/(m² sr), what the nodes send in the unit directions w. */

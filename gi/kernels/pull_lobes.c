@@ -9,7 +9,41 @@ VINL es_node_lobe_v load_lobes(const es_point_lobe* lobes, vi at)
     return es_node_lobe_unpack_v(words[0], words[1], words[2], words[3]);
 }
 
+/* Length of the mean of four normals below which there is an edge between them, and nothing bends. */
+#define SMOOTH 0.85f
+
 VINL vf luminance(const vf light[3]) { return vf_set1(0.2126f) * light[0] + vf_set1(0.7152f) * light[1] + vf_set1(0.0722f) * light[2]; }
+
+/* Adds to the widths of leaves, groups [begin, end) of four, what their surface bends within a disc (gi/micro/light.h): a third of what widens the four of them together. */
+void ES_KERNEL(es_gi_widen_lobes)(es_point_lobe* leaves, uint32_t begin, uint32_t end)
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f), tiny = vf_set1(1e-12f);
+    for (uint32_t group = begin; group < end; group += VW) {
+        const uint32_t n = end - group < VW ? end - group : VW;
+        const vi first = vi_min(vi_iota() + vi_set1((int32_t)group), vi_set1((int32_t)end - 1)) << 2;
+        es_node_lobe_v l[4];
+        vf axis[3] = {zero, zero, zero}, normal[3] = {zero, zero, zero}, power = zero;
+        for (int j = 0; j < 4; j++) {
+            l[j] = load_lobes(leaves, first + vi_set1(j));
+            const vf weight = luminance(l[j].light);
+            for (int k = 0; k < 3; k++) {
+                axis[k] = axis[k] + l[j].axis[k] * weight;
+                normal[k] = normal[k] + l[j].normal[k] * vf_set1(0.25f);
+            }
+            power = power + weight;
+        }
+        const vm lit = vm_gt(power, tiny);
+        if (!vm_any(lit)) continue;
+        const vf inverse = one / vf_select(lit, power, one);
+        for (int k = 0; k < 3; k++) axis[k] = axis[k] * inverse;
+        const vf together = vf_min(vf_sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]), one), square = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+        const vf more = vf_and(lit & vm_gt(square, vf_set1(SMOOTH * SMOOTH)), vf_set1(0.5f / 3.0f) * (one - together) / vf_max(together, vf_set1(1e-3f)));
+        for (int j = 0; j < 4; j++) {
+            const vi shapes = es_node_lobe_shape_v(vf_min(l[j].width + more, one), l[j].length, l[j].phong);
+            for (uint32_t k = 0; k < n; k++) leaves[4 * (size_t)(group + k) + (size_t)j].shape = (uint32_t)shapes[k];
+        }
+    }
+}
 
 void ES_KERNEL(es_gi_forest_pull_lobes)(const es_node_lobes* lobes, uint32_t begin, uint32_t end)
 {

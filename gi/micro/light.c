@@ -41,6 +41,15 @@ void es_forest_each_leaf(es_context* context, const es_point_forest* forest, es_
     es_parallel_for(context, (uint32_t)((forest->leaf_count + GRAIN - 1) / GRAIN), 1, chunks, &loop);
 }
 
+typedef struct widening { const es_gi_kernels* kernels; es_point_lobe* leaves; } widening;
+
+static void widen(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const widening* w = user;
+    (void)worker;
+    w->kernels->widen_lobes(w->leaves, begin, end);
+}
+
 typedef struct direct_loop { const es_gi_kernels* kernels; const es_point_light_job* job; const es_point_forest* forest; } direct_loop;
 
 static void direct(void* user, const es_leaf_range* range, uint32_t worker)
@@ -59,5 +68,10 @@ es_result es_points_light_direct(es_context* context, es_point_forest* forest, c
     if (result) return result;
     direct_loop loop = {es_gi_kernel_table(es_context_isa(context)), job, forest};
     es_forest_each_leaf(context, forest, direct, &loop);
+    for (uint32_t i = 0; i < forest->tree_count && glossy; i++) {
+        const es_point_tree* tree = &forest->trees[i];
+        widening w = {loop.kernels, forest->lobes + tree->first + tree->leaf_count};
+        if (tree->glossy && tree->leaf_count >= 4) es_parallel_for(context, tree->leaf_count / 4, GRAIN / 4, widen, &w);
+    }
     return ES_OK;
 }

@@ -5,7 +5,9 @@
  * albedo, Fd as in gi/surface.h, the mean over directions by their cosine, lobe(c) the directional albedo of the lobe (gi/micro/lobe_albedo.h).
  * So a point sends as much power as its surface would; what is approximated is where to: the interface's shadow at grazing directions is spread over the
  * hemisphere, and so is the lobe. That is all there is to a lobe that is hardly one; one that es_surface_has_lobe says is worth evaluating is kept apart, if the job has shapes
- * for it: E lobe(c) is then the power that goes about the direction which gi/micro/lobe_shape.h has for it. A point has one lobe: of several lights the mean direction by the
+ * for it: E lobe(c) is then the power that goes about the direction which gi/micro/lobe_shape.h has for it. A disc stands for a surface that bends within it; so
+ * that few discs do not sparkle, four that are neighbours in the tree are widened by a third of what their axes are spread by among each other, which is how the variance of what is
+ * even over each of four squares is to that of their middles, if no edge is between them. A point has one lobe: of several lights the mean direction by the
  * luminance of what each brings, and as wide as these lie apart. */
 #ifndef EARTHSHINE_GI_MICRO_LIGHT_H
 #define EARTHSHINE_GI_MICRO_LIGHT_H

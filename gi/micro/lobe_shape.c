@@ -1,7 +1,8 @@
 #include "gi/micro/lobe_shape.h"
 
-/* Squares of samples: of the model's lobe, and of what stands for it. */
-enum { MODEL = 12, SHAPE = 9, STEPS = 14 };
+/* Samples: of the model's lobe, the square of it; of what stands for it, at so many angles from its axis, so many about it. */
+enum { MODEL = 12, ACROSS = 20, AROUND = 6, STEPS = 14 };
+#define WIDE 0.25f
 
 typedef struct drawn { uint32_t count; es_vec3 w[MODEL * MODEL]; float weight[MODEL * MODEL]; float sum; } drawn;
 
@@ -57,20 +58,21 @@ static float distance(bool phong, const drawn* model, shape* s)
     es_vec3 t, b;
     float kept = 0.0f, square = 0.0f, common = 0.0f;
     es_orthonormal_basis(s->mu, &t, &b);
-    for (int i = 0; i < SHAPE; i++) {
-        const float x = within(phong, s->a, ((float)i + 0.5f) / SHAPE), z = 1.0f - x, r = es_sqrt(es_maxf(x * (2.0f - x), 0.0f)), p = density(phong, s->a, x);
-        for (int j = 0; j < SHAPE; j++) {
+    for (int i = 0; i < ACROSS; i++) {
+        /* closer towards the rim: what is below the horizon is mostly there */
+        const float left = ((float)i + 0.5f) / ACROSS, weight = 2.0f * left / (ACROSS * AROUND), x = within(phong, s->a, 1.0f - left * left), z = 1.0f - x, r = es_sqrt(es_maxf(x * (2.0f - x), 0.0f)), p = density(phong, s->a, x);
+        for (int j = 0; j < AROUND; j++) {
             float sine, cosine;
-            es_sincos(2.0f * ES_PI * ((float)j + 0.5f) / SHAPE, &sine, &cosine);
+            es_sincos(2.0f * ES_PI * ((float)j + 0.5f * (float)(1 + i % 2)) / AROUND, &sine, &cosine);
             const float c = s->mu.z * z + (t.z * cosine + b.z * sine) * r, share = es_clampf(c * (1.0f / ES_LOBE_HORIZON), 0.0f, 1.0f);
-            kept += share;
-            square += p * share * share;
+            kept += weight * share;
+            square += weight * p * share * share;
         }
     }
     for (uint32_t i = 0; i < model->count; i++)
         common += model->weight[i] * density(phong, s->a, apart(model->w[i], s->mu)) * es_minf(model->w[i].z * (1.0f / ES_LOBE_HORIZON), 1.0f);
-    s->gain = (float)(SHAPE * SHAPE) / es_maxf(kept, 1.0f);
-    return s->gain * (s->gain * square / (SHAPE * SHAPE) - 2.0f * common / model->sum);
+    s->gain = 1.0f / es_maxf(kept, 0.02f);
+    return s->gain * (s->gain * square - 2.0f * common / model->sum);
 }
 
 /* The best width about mu, by golden section over its logarithm. */
@@ -104,10 +106,12 @@ static float widen(bool phong, const drawn* model, float typical, shape* s)
 }
 
 /* Between the mean direction of what is reflected and the mirror direction. */
-static shape fit(bool phong, const es_surface* s, float c, float typical)
+static shape fit(bool phong, const es_surface* s, float c, float own)
 {
     enum { DIRECTIONS = 4 };
-    const float sine = es_sqrt(1.0f - c * c);
+    /* a lobe that wide has no other peak than its mean */
+    const int directions = own > WIDE ? 1 : DIRECTIONS;
+    const float sine = es_sqrt(1.0f - c * c), typical = phong ? own : own * c;
     const es_vec3 mirror = es_v3(-sine, 0, c);
     drawn model;
     es_vec3 mean = es_v3(0, 0, 0);
@@ -117,7 +121,7 @@ static shape fit(bool phong, const es_surface* s, float c, float typical)
     for (uint32_t i = 0; i < model.count; i++) mean = es_v3_add(mean, es_v3_scale(model.w[i], model.weight[i]));
     mean = es_v3_normalize(es_v3(mean.x, 0, mean.z), mirror);
     float least = 3e38f;
-    for (int i = 0; i < DIRECTIONS; i++) {
+    for (int i = 0; i < directions; i++) {
         shape here = {.mu = es_v3_normalize(es_v3_add(es_v3_scale(mean, (float)(DIRECTIONS - 1 - i)), es_v3_scale(mirror, (float)i)), mirror)};
         const float found = widen(phong, &model, typical, &here);
         if (!(found < least)) continue;
@@ -138,7 +142,7 @@ static void rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
                 const float share = (float)row / (ES_SHAPE_ROWS - 1), roughness = phong ? ES_SHAPE_MAX_EXPONENT * share * share : share, c = es_maxf((float)column / (ES_SHAPE_COLUMNS - 1), 0.02f);
                 const es_surface s = {.specular = es_v3(1, 1, 1), .roughness = roughness, .model = phong ? ES_SURFACE_PHONG : ES_SURFACE_METALLIC_ROUGHNESS};
                 const float own = phong ? 0.5f / (roughness + 1.0f) : es_maxf(roughness * roughness * roughness * roughness, ES_SURFACE_MIN_ALPHA2);
-                const shape found = fit(phong, &s, c, phong ? own : own * c);
+                const shape found = fit(phong, &s, c, own);
                 const float sine = es_sqrt(1.0f - c * c);
                 shapes->lean[phong][at] = sine > 0.0f ? -found.mu.x / sine : 1.0f;
                 shapes->lift[phong][at] = found.mu.z - c;
