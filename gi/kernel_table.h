@@ -56,6 +56,9 @@
     X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))                   \
     /* gi/micro/forest_parts.h */                                                                                \
     X(forest_box, (const float* positions, const float u[9], uint32_t begin, uint32_t end, float low[3], float high[3])) \
+    /* count: a multiple of eight; to: records of four floats, the first three of the positions' after u, or of `from` as they are */ \
+    X(forest_vertices, (const float* positions, const float u[9], const uint32_t* vertices, uint32_t count, float* to)) \
+    X(forest_normals, (const float* from, const uint32_t* vertices, uint32_t count, float* to))                  \
     X(forest_leaves, (const es_leaf_job* job, uint32_t begin, uint32_t end))                                     \
     X(forest_merge, (const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)) \
     X(forest_quantise, (const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)) \

@@ -33,11 +33,11 @@ static float wild(float scale)
 
 enum { CORNERS = 96, FACES = 60, LEAVES = 64 };
 
-typedef struct outputs { plane columns[ES_NODE_COLUMNS], area, world[3], normal, nodes; float sums[2], box[6]; } outputs;
+typedef struct outputs { plane vertices, columns[ES_NODE_COLUMNS], area, world[3], normal, nodes; float sums[2], box[6]; } outputs;
 
 static outputs new_outputs(void)
 {
-    outputs o = {0};
+    outputs o = {.vertices = new_plane(8 * CORNERS)};
     for (int k = 0; k < ES_NODE_COLUMNS; k++) o.columns[k] = new_plane(2 * LEAVES);
     o.area = new_plane(2 * LEAVES);
     for (int k = 0; k < 3; k++) o.world[k] = new_plane(LEAVES);
@@ -54,6 +54,7 @@ static void compare_planes(plane a, plane b)
 
 static void free_outputs(outputs* o)
 {
+    free(o->vertices.memory);
     for (int k = 0; k < ES_NODE_COLUMNS; k++) free(o->columns[k].memory);
     free(o->area.memory);
     for (int k = 0; k < 3; k++) free(o->world[k].memory);
@@ -61,9 +62,17 @@ static void free_outputs(outputs* o)
     free(o->nodes.memory);
 }
 
-/* A whole block: leaves, levels, rounding. */
-static void make_nodes(const es_gi_kernels* kernels, es_leaf_job job, uint32_t leaves, outputs* o)
+typedef struct block { const float *positions, *normals; float u[9]; uint32_t vertices[CORNERS]; } block;
+
+/* A whole block: vertices, leaves, levels, rounding. */
+static void make_nodes(const es_gi_kernels* kernels, const block* b, es_leaf_job job, uint32_t leaves, outputs* o)
 {
+    kernels->forest_vertices(b->positions, b->u, b->vertices, CORNERS, at(o->vertices));
+    job.vertices = at(o->vertices);
+    if (b->normals) {
+        kernels->forest_normals(b->normals, b->vertices, CORNERS, at(o->vertices) + 4 * CORNERS);
+        job.normals = at(o->vertices) + 4 * CORNERS;
+    }
     es_node_columns columns;
     for (int k = 0; k < ES_NODE_COLUMNS; k++) columns.of[k] = at(o->columns[k]);
     job.columns = columns;
@@ -73,7 +82,7 @@ static void make_nodes(const es_gi_kernels* kernels, es_leaf_job job, uint32_t l
     job.y = at(o->world[1]);
     job.z = at(o->world[2]);
     job.normal = (uint32_t*)at(o->normal);
-    kernels->forest_box(job.positions, job.u, 0, CORNERS - 3, o->box, o->box + 3);
+    kernels->forest_box(b->positions, b->u, 0, CORNERS - 3, o->box, o->box + 3);
     kernels->forest_leaves(&job, 0, leaves);
     for (uint32_t level = leaves / 2; level; level /= 2) kernels->forest_merge(&columns, level, level == leaves / 2, at(o->area) + 2 * level, at(o->area) + level, &o->sums[level % 2]);
     es_node_frame frame = {.radius_step = 4.0f / 65535.0f, .error = 1e-4f};
@@ -90,34 +99,35 @@ static void check_nodes(void** state)
     (void)state;
     for (uint32_t trial = 0; trial < 200; trial++) {
         float positions[4 * CORNERS], normals[4 * CORNERS], shapes[3][LEAVES];
-        uint32_t indices[3 * FACES + 1], triangle[LEAVES], barycentric[LEAVES];
+        uint32_t barycentric[LEAVES];
+        uint16_t corners[3 * LEAVES];
         for (int i = 0; i < 4 * CORNERS; i++) {
             positions[i] = trial % 2 ? uniform(-1, 1) : wild(2);
             normals[i] = trial % 3 ? uniform(-1, 1) : wild(2);
         }
-        for (int i = 0; i < 3 * FACES + 1; i++) indices[i] = random_bits() % CORNERS;
+        block b = {.positions = positions, .normals = trial % 4 < 2 ? normals : NULL, .u = {1, 0, 0, uniform(-1, 1), 2, 0, uniform(-1, 1), 0, uniform(0, 1)}};
+        for (int i = 0; i < CORNERS; i++) b.vertices[i] = random_bits() % CORNERS;
+        for (int i = 0; i < 3 * LEAVES; i++) corners[i] = (uint16_t)(2 * (random_bits() % CORNERS));
         for (int i = 0; i < LEAVES; i++) {
-            triangle[i] = random_bits() % FACES;
             const float u = uniform(0, 1), v = uniform(0, 1 - u);
             barycentric[i] = (uint32_t)(u * 65535) | (uint32_t)(v * 65535) << 16;
             for (int k = 0; k < 3; k++) shapes[k][i] = trial % 5 ? uniform(0, 0.2f) : uniform(-1, 1) * (k ? 1e6f : 1.0f);
         }
-        const es_raster_mesh mesh = {.positions = positions, .normals = trial % 4 < 2 ? normals : NULL, .indices = indices, .vertex_count = CORNERS, .triangle_count = FACES};
-        es_leaf_job job = {.mesh = &mesh, .positions = positions, .u = {1, 0, 0, uniform(-1, 1), 2, 0, uniform(-1, 1), 0, uniform(0, 1)}, .magnify = 0.5f, .side = trial % 2 ? 1.0f : -1.0f,
-            .triangle = triangle, .barycentric = barycentric, .shapes = {shapes[0], shapes[1], shapes[2]}};
+        es_leaf_job job = {.corners = corners, .magnify = 0.5f, .side = trial % 2 ? 1.0f : -1.0f, .barycentric = barycentric, .shapes = {shapes[0], shapes[1], shapes[2]}};
         for (int i = 0; i < 9; i++) {
             job.cofactors[i] = uniform(-1, 1);
             job.rotation[i] = uniform(-1, 1);
         }
         const uint32_t leaves = 1u << trial % 7;
         outputs expected = new_outputs();
-        make_nodes(es_gi_kernel_table(ES_ISA_SCALAR), job, leaves, &expected);
+        make_nodes(es_gi_kernel_table(ES_ISA_SCALAR), &b, job, leaves, &expected);
         for (uint32_t i = leaves; i < 2 * leaves; i++)
             for (int k = 0; k < ES_NODE_COLUMNS; k++) assert_true(isfinite(at(expected.columns[k])[i]));
         for (uint32_t isa = ES_ISA_SCALAR; isa < ES_ISA_COUNT; isa++) {
             if (!(es_isa_available_mask() & 1u << isa)) continue;
             outputs o = new_outputs();
-            make_nodes(es_gi_kernel_table((es_isa)isa), job, leaves, &o);
+            make_nodes(es_gi_kernel_table((es_isa)isa), &b, job, leaves, &o);
+            compare_planes(expected.vertices, o.vertices);
             for (int k = 0; k < ES_NODE_COLUMNS; k++) compare_planes(expected.columns[k], o.columns[k]);
             for (int k = 0; k < 3; k++) compare_planes(expected.world[k], o.world[k]);
             compare_planes(expected.area, o.area);

@@ -162,78 +162,95 @@ void ES_KERNEL(es_gi_forest_box)(const float* positions, const float u[9], uint3
     }
 }
 
-/* Triangles of neighbouring leaves are near each other in space, not in memory: each is asked for before it is needed, corners after their indices. */
-VINL void fetch_ahead(const es_leaf_job* job, uint32_t i, uint32_t end)
+/* Vertices of neighbouring leaves are near each other in space, not in memory: they are asked for before they are needed. */
+enum { AHEAD = 4 * VW };
+
+void ES_KERNEL(es_gi_forest_vertices)(const float* positions, const float u[9], const uint32_t* vertices, uint32_t count, float* to)
 {
-    const uint32_t* indices = job->mesh->indices;
-    if (i + 6 * VW <= end)
-        for (uint32_t k = 0; k < VW; k++) __builtin_prefetch(indices + 3 * (size_t)job->triangle[i + 5 * VW + k]);
-    if (i + 3 * VW <= end)
-        for (uint32_t k = 0; k < VW; k++) {
-            const uint32_t* index = indices + 3 * (size_t)job->triangle[i + 2 * VW + k];
-            for (int c = 0; c < 3; c++) __builtin_prefetch(job->positions + 4 * (size_t)index[c]);
-        }
+    const float bound = bound_before(u);
+    for (uint32_t i = 0; i < count; i += VW) {
+        if (i + AHEAD < count)
+            for (uint32_t k = 0; k < VW; k++) __builtin_prefetch(positions + 4 * (size_t)vertices[i + AHEAD + k]);
+        const v3 p = corner(positions, vi_load(vertices + i), u, bound);
+        vf_store4(to + 4 * (size_t)i, p.x, p.y, p.z, vf_zero());
+    }
 }
 
+void ES_KERNEL(es_gi_forest_normals)(const float* from, const uint32_t* vertices, uint32_t count, float* to)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        if (i + AHEAD < count) __builtin_prefetch(from + 4 * (size_t)vertices[i + AHEAD]);
+        memcpy(to + 4 * (size_t)i, from + 4 * (size_t)vertices[i], 4 * sizeof(float));
+    }
+}
+
+typedef uint16_t half_words __attribute__((vector_size(16)));
+VINL vi load_corners(const uint16_t* corners)
+{
+    half_words w;
+    memcpy(&w, corners, sizeof w);
+    return __builtin_convertvector(w, vi);
+}
+/* corners: twice the records' numbers */
+VINL v3 record(const float* records, vi corners)
+{
+    v3 a;
+    vf w;
+    vf_gather4(records, 8, corners, &a.x, &a.y, &a.z, &w);
+    return a;
+}
+
+VINL void make_leaves(const es_leaf_job* job, uint32_t i, uint32_t node, uint32_t n)
+{
+    const vf one = vf_set1(1.0f), side = vf_set1(job->side), magnify = vf_set1(job->magnify);
+    const uint16_t* corners = job->corners + 3 * (size_t)i;
+    const vi packed = load_words(job->barycentric + i, n), ia = load_corners(corners), ib = load_corners(corners + VW), ic = load_corners(corners + 2 * VW);
+    const vf s = vf_from_int(packed & vi_set1(0xffff)) * vf_set1(1.0f / 65535.0f), t = vf_from_int(vi_shift_right_logical(packed, 16)) * vf_set1(1.0f / 65535.0f);
+    const v3 a = record(job->vertices, ia), b = record(job->vertices, ib), c = record(job->vertices, ic);
+    const v3 u = v3_sub(b, a), v = v3_sub(c, a), p = v3_add(v3_add(a, v3_scale(u, s)), v3_scale(v, t));
+
+    /* the normal: of the corners, where the mesh has some, or the triangle's */
+    v3 normal = v3_cross(v3_scale(u, magnify), v3_scale(v, magnify));
+    vf square = v3_dot(normal, normal);
+    if (job->normals) {
+        const v3 na = v3_scale(record(job->normals, ia), one - s - t), nb = v3_scale(record(job->normals, ib), s), nc = v3_scale(record(job->normals, ic), t);
+        const v3 smooth = by_matrix(job->cofactors, v3_bound(v3_add(v3_add(na, nb), nc)));
+        const vf length = v3_dot(smooth, smooth);
+        const vm some = vm_ge(length, vf_set1(1e-20f));
+        normal = v3_select(some, smooth, normal);
+        square = vf_select(some, length, square);
+    }
+    const vm none = vm_lt(square, vf_set1(1e-37f));
+    normal = v3_select(none, (v3){vf_zero(), side, vf_zero()}, v3_scale(normal, side / vf_sqrt(vf_select(none, one, square))));
+
+    if (job->x) {
+        const v3 world = by_matrix(job->rotation, p), turned = by_matrix(job->rotation, normal);
+        store_floats(job->x + i, n, world.x + vf_set1(job->translation[0]));
+        store_floats(job->y + i, n, world.y + vf_set1(job->translation[1]));
+        store_floats(job->z + i, n, world.z + vf_set1(job->translation[2]));
+        store_words(job->normal + i, n, es_pack_normal_v(turned.x, turned.y, turned.z));
+    }
+    if (!job->columns.of[0]) return;
+
+    /* the disc's axes */
+    const vf along = load_floats(job->shapes.along + i, n), across = load_floats(job->shapes.across + i, n), shear = load_floats(job->shapes.shear + i, n);
+    const vm hole = vm_lt(along, vf_zero());
+    const v3 t1 = v3_bound(v3_scale(u, along)), t2 = v3_bound(v3_scale(v3_sub(v, v3_scale(u, shear)), across));
+    const v3 cross = v3_cross(t1, t2);
+    const vf circle = vf_sqrt(v3_dot(cross, cross));
+    const vf g11 = v3_dot(t1, t1), g22 = v3_dot(t2, t2), g12 = v3_dot(t1, t2), difference = g11 - g22;
+    const vf larger = vf_set1(0.5f) * (g11 + g22 + vf_sqrt(vf_min(difference * difference + vf_set1(4.0f) * (g12 * g12), vf_set1(1e37f))));
+    const vf radius = vf_sqrt(vf_min(vf_min(larger, vf_set1(ES_POINT_STRETCH) * circle), vf_set1(1e18f)));
+    store_nodes(&job->columns, node, n, (nodes8){.centre = p, .axis = normal, .radius = vf_select(hole, vf_set1(-1.0f), radius), .cosine = one});
+    store_floats(job->area + i, n, vf_select(hole, vf_zero(), vf_min(circle * vf_set1(3.14159265f / (ES_POINT_OVERLAP * ES_POINT_OVERLAP)), vf_set1(1e18f))));
+}
+
+/* `begin` is a multiple of eight. */
 void ES_KERNEL(es_gi_forest_leaves)(const es_leaf_job* job, uint32_t begin, uint32_t end)
 {
-    const es_raster_mesh* mesh = job->mesh;
-    const vf one = vf_set1(1.0f), side = vf_set1(job->side), magnify = vf_set1(job->magnify);
-    const float bound = bound_before(job->u);
-    for (uint32_t i = begin; i < end; i += VW) {
-        const uint32_t n = lanes_left(i, end);
-        fetch_ahead(job, i, end);
-        const vi triangle = load_words(job->triangle + i, n), packed = load_words(job->barycentric + i, n);
-        const vf s = vf_from_int(packed & vi_set1(0xffff)) * vf_set1(1.0f / 65535.0f), t = vf_from_int(vi_shift_right_logical(packed, 16)) * vf_set1(1.0f / 65535.0f);
-        vi ia, ib, ic, unused;
-        vi_gather4(mesh->indices, 12, triangle, &ia, &ib, &ic, &unused);
-        const v3 a = corner(job->positions, ia, job->u, bound), b = corner(job->positions, ib, job->u, bound), c = corner(job->positions, ic, job->u, bound);
-        const v3 u = v3_sub(b, a), v = v3_sub(c, a), p = {a.x + s * u.x + t * v.x, a.y + s * u.y + t * v.y, a.z + s * u.z + t * v.z};
-
-        /* the normal: of the corners, where the mesh has some, or the triangle's */
-        v3 normal = v3_cross(v3_scale(u, magnify), v3_scale(v, magnify));
-        vf square = v3_dot(normal, normal);
-        if (mesh->normals) {
-            v3 na, nb, nc;
-            vf w;
-            vf_gather4(mesh->normals, 16, ia, &na.x, &na.y, &na.z, &w);
-            vf_gather4(mesh->normals, 16, ib, &nb.x, &nb.y, &nb.z, &w);
-            vf_gather4(mesh->normals, 16, ic, &nc.x, &nc.y, &nc.z, &w);
-            const vf r = one - s - t;
-            v3 smooth = v3_bound((v3){r * na.x + s * nb.x + t * nc.x, r * na.y + s * nb.y + t * nc.y, r * na.z + s * nb.z + t * nc.z});
-            smooth = by_matrix(job->cofactors, smooth);
-            const vf length = v3_dot(smooth, smooth);
-            const vm some = vm_ge(length, vf_set1(1e-20f));
-            normal = (v3){vf_select(some, smooth.x, normal.x), vf_select(some, smooth.y, normal.y), vf_select(some, smooth.z, normal.z)};
-            square = vf_select(some, length, square);
-        }
-        const vm none = vm_lt(square, vf_set1(1e-37f));
-        const vf scale = side / vf_sqrt(vf_select(none, one, square));
-        normal = (v3){vf_select(none, vf_zero(), normal.x * scale), vf_select(none, side, normal.y * scale), vf_select(none, vf_zero(), normal.z * scale)};
-
-        if (job->x) {
-            const v3 world = by_matrix(job->rotation, p), turned = by_matrix(job->rotation, normal);
-            store_floats(job->x + i, n, world.x + vf_set1(job->translation[0]));
-            store_floats(job->y + i, n, world.y + vf_set1(job->translation[1]));
-            store_floats(job->z + i, n, world.z + vf_set1(job->translation[2]));
-            store_words(job->normal + i, n, es_pack_normal_v(turned.x, turned.y, turned.z));
-        }
-        if (!job->columns.of[0]) continue;
-
-        /* the disc's axes */
-        const vf along = load_floats(job->shapes.along + i, n), across = load_floats(job->shapes.across + i, n), shear = load_floats(job->shapes.shear + i, n);
-        const vm hole = vm_lt(along, vf_zero());
-        const v3 t1 = v3_bound(v3_scale(u, along));
-        const v3 t2 = v3_bound(v3_scale((v3){v.x - shear * u.x, v.y - shear * u.y, v.z - shear * u.z}, across));
-        const v3 cross = v3_cross(t1, t2);
-        const vf circle = vf_sqrt(v3_dot(cross, cross));
-        const vf g11 = v3_dot(t1, t1), g22 = v3_dot(t2, t2), g12 = v3_dot(t1, t2), difference = g11 - g22;
-        const vf larger = vf_set1(0.5f) * (g11 + g22 + vf_sqrt(vf_min(difference * difference + vf_set1(4.0f) * (g12 * g12), vf_set1(1e37f))));
-        const vf radius = vf_sqrt(vf_min(vf_min(larger, vf_set1(ES_POINT_STRETCH) * circle), vf_set1(1e18f)));
-        const vf node[ES_NODE_COLUMNS] = {p.x, p.y, p.z, vf_select(hole, vf_set1(-1.0f), radius), normal.x, normal.y, normal.z, vf_zero(), vf_zero(), one};
-        for (int k = 0; k < ES_NODE_COLUMNS; k++) store_floats(job->columns.of[k] + job->first + (i - begin), n, node[k]);
-        store_floats(job->area + i, n, vf_select(hole, vf_zero(), vf_min(circle * vf_set1(3.14159265f / (ES_POINT_OVERLAP * ES_POINT_OVERLAP)), vf_set1(1e18f))));
-    }
+    uint32_t i = begin;
+    for (; i + VW <= end; i += VW) make_leaves(job, i, job->first + (i - begin), VW);
+    if (i < end) make_leaves(job, i, job->first + (i - begin), end - i);
 }
 
 /* The smallest cone about two, of half angles below 90°: its axis is turned by (θ + α2 - α1) / 2 from the first's to the second's, θ being the angle between

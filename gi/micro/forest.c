@@ -140,7 +140,7 @@ static void share_out(share* shares, uint32_t count, uint32_t points)
 
 static size_t padded(size_t count) { return (count + 7) / 8 * 8; }
 
-enum { ARRAYS = 25 };
+enum { ARRAYS = 28 };
 typedef struct array { void** pointer; size_t count, size; } array;
 
 static void list_arrays(es_point_forest* f, array out[ARRAYS])
@@ -156,6 +156,7 @@ static void list_arrays(es_point_forest* f, array out[ARRAYS])
         {(void**)&f->y, leaves, sizeof(float)}, {(void**)&f->z, leaves, sizeof(float)}, {(void**)&f->normal, leaves, sizeof(uint32_t)},
         {(void**)&f->albedo_rg, leaves, sizeof(uint32_t)}, {(void**)&f->albedo_b, leaves, sizeof(uint32_t)}, {(void**)&f->surface, leaves, sizeof(uint32_t)},
         {(void**)&f->triangle, leaves, sizeof(uint32_t)}, {(void**)&f->barycentric, leaves, sizeof(uint32_t)}, {(void**)&own->shapes.along, 3 * leaves, sizeof(float)},
+        {(void**)&own->corners, own->corner_count, sizeof(uint16_t)}, {(void**)&own->vertices, own->corner_count, sizeof(uint32_t)}, {(void**)&own->places, own->place_count, sizeof(float)},
         {(void**)&own->upper.of[0], ES_NODE_COLUMNS * own->upper_count, sizeof(float)}, {(void**)&own->scratch.of[0], ES_NODE_COLUMNS * own->scratch_count, sizeof(float)}};
     memcpy(out, all, sizeof all);
 }
@@ -166,7 +167,7 @@ static void forget_counts(es_point_forest* forest)
     struct es_forest_private* own = forest->own;
     own->shapes = (es_leaf_shapes){0};
     own->upper = own->scratch = (es_node_columns){{0}};
-    own->task_count = own->upper_count = own->scratch_count = 0;
+    own->task_count = own->corner_count = own->place_count = own->upper_count = own->scratch_count = 0;
     forest->tree_count = 0;
     forest->node_count = forest->leaf_count = 0;
     forest->top = (es_point_tree){0};
@@ -230,6 +231,7 @@ void es_forest_free(es_context* context, es_point_forest* forest)
 
 /* ---- trees ------------------------------------------------------------------------------------------------------------------------ */
 
+static size_t corners_of(uint32_t leaves) { return 3 * padded(leaves); }
 static uint32_t tasks_of(uint32_t leaves) { return leaves < ES_TREE_BLOCK ? 1 : leaves / ES_TREE_BLOCK; }
 
 /* Is there a tree for each share, in order? */
@@ -259,13 +261,15 @@ static void take_tree(es_point_forest* to, uint32_t new_tree, const es_point_for
     const es_point_tree* old = &from->trees[old_tree];
     const size_t first = tree->first, first_leaf = tree->first_leaf, nodes = 2 * (size_t)tree->leaf_count, leaves = tree->leaf_count;
     const uint32_t instance = tree->instance, source = to->own->states[new_tree].source, blocks = tasks_of(tree->leaf_count);
-    const size_t upper = to->own->states[new_tree].upper, old_upper = from->own->states[old_tree].upper;
+    const size_t corner = to->own->states[new_tree].corner, upper = to->own->states[new_tree].upper, old_upper = from->own->states[old_tree].upper;
     *tree = *old;
     tree->instance = instance;
     tree->first = first;
     tree->first_leaf = first_leaf;
     to->own->states[new_tree] = from->own->states[old_tree];
     to->own->states[new_tree].source = source;
+    to->own->states[new_tree].corner = corner;
+    to->own->states[new_tree].linked = false;
     to->own->states[new_tree].upper = upper;
     for (int k = 0; k < ES_NODE_COLUMNS; k++) copy_words(to->own->upper.of[k], upper, from->own->upper.of[k], old_upper, 2 * (size_t)blocks, sizeof(float));
     copy_words(to->nodes, first, from->nodes, old->first, nodes, sizeof *to->nodes);
@@ -292,6 +296,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
         next.tree_count++;
         next.leaf_count += (size_t)1 << shares[i].leaves;
         own.task_count += tasks_of(1u << shares[i].leaves);
+        own.corner_count += corners_of(1u << shares[i].leaves);
     }
     next.top.leaf_count = next.tree_count ? 1 : 0;
     while (next.top.leaf_count < next.tree_count) next.top.leaf_count *= 2;
@@ -301,6 +306,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
     next.top.instance = UINT32_MAX;
     next.top.rotation[0] = next.top.rotation[4] = next.top.rotation[8] = 1.0f;
     own.upper_count = 2 * (own.task_count + next.top.leaf_count);
+    own.place_count = ES_TREE_PLACES * (size_t)es_context_workers(context);
     own.scratch_count = ES_TREE_SCRATCH * (size_t)es_context_workers(context);
     if (!next.tree_count) {
         free_arrays(context, forest);
@@ -310,13 +316,13 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
     es_result result = allocate_arrays(context, &next);
     if (result) return result;
     uint32_t tree = 0, task = 0, old = 0;
-    size_t leaf = 0;
+    size_t leaf = 0, corner = 0;
     for (uint32_t i = 0; i < 2 * list->instance_count; i++) {
         if (shares[i].leaves == UINT32_MAX) continue;
         const uint32_t leaves = 1u << shares[i].leaves, id = sources[i / 2].id;
         const bool back = i % 2 == 1;
         next.trees[tree] = (es_point_tree){.instance = i / 2, .back = back, .leaf_count = leaves, .first = 2 * leaf, .first_leaf = leaf};
-        own.states[tree] = (es_tree_state){.id = id, .source = i / 2, .upper = 2 * (size_t)task};
+        own.states[tree] = (es_tree_state){.id = id, .source = i / 2, .corner = corner, .upper = 2 * (size_t)task};
         for (uint32_t turn = 0; turn < forest->tree_count; turn++, old++) {
             if (old >= forest->tree_count) old = 0;
             if (forest->own->states[old].id != id || forest->trees[old].back != back || forest->trees[old].leaf_count != leaves) continue;
@@ -326,6 +332,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
         for (uint32_t k = 0; k < tasks_of(leaves); k++) own.tasks[task++] = (es_tree_task){.tree = tree, .block = k};
         tree++;
         leaf += leaves;
+        corner += corners_of(leaves);
     }
     free_arrays(context, forest);
     struct es_forest_private* kept = forest->own;
@@ -479,6 +486,7 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
             else result = build(context, forest, i, source);
             if (result) return result;
             state->base = -1.0;
+            state->linked = false;
             for (int c = 0; c < 3; c++) memset(forest->radiance[c] + tree->first, 0, 2 * (size_t)tree->leaf_count * sizeof(float));
             for (uint32_t k = 0; k < 2 * tree->leaf_count; k++) forest->nodes[tree->first + k].radiance = 0;
         }
@@ -515,6 +523,7 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
         result = rebuild(context, forest, i);
         if (result) return result;
         state->base = -1.0;
+        state->linked = false;
         again = light = true;
         count->built++;
     }

@@ -1,5 +1,5 @@
-/* Between the files of the hierarchy of points: forest.c brings it up to the scene, points.c places, tree_build.c splits, tree_looks.c reads materials, tree_refit.c computes nodes,
- * gi/kernels/forest.c does so eight at a time. */
+/* Between the files of the hierarchy of points: forest.c brings it up to the scene, points.c places, tree_build.c splits, tree_looks.c reads materials, tree_link.c finds the leaves' vertices,
+ * tree_refit.c computes nodes, gi/kernels/forest.c does so eight at a time. */
 #ifndef EARTHSHINE_GI_MICRO_FOREST_PARTS_H
 #define EARTHSHINE_GI_MICRO_FOREST_PARTS_H
 
@@ -19,13 +19,12 @@ typedef struct es_leaf_shapes { float *along, *across, *shear; } es_leaf_shapes;
 
 /* Arrays begin at the tree's first leaf. */
 typedef struct es_leaf_job {
-    const es_raster_mesh* mesh;
-    const float* positions;            /* the mesh's, or those at rest */
-    float u[9];                        /* columns; upper triangular */
+    const float *vertices, *normals;   /* of the block's vertices, records of four floats: places after u; normals NULL: the triangles' are taken */
+    const uint16_t* corners;           /* where in these, times two: eight leaves' first corners, their second, their third, then the next eight's */
     float cofactors[9];                /* of u over its largest element, for normals */
     float magnify;                     /* edges times this are about 1 or less, and squares of areas no denormals */
     float side;                        /* 1: front, -1: back */
-    const uint32_t *triangle, *barycentric;
+    const uint32_t* barycentric;
     es_leaf_shapes shapes;
     es_node_columns columns;           /* leaf `begin` is node `first`; NULL: places in the world only */
     uint32_t first;
@@ -114,9 +113,12 @@ void es_tree_split_any(es_split_point* points, uint32_t count);
 enum { ES_TREE_BLOCK = 2048 };  /* leaves that one task takes with all nodes above them; a power of two */
 enum { ES_TREE_SCRATCH = 2 * ES_TREE_BLOCK + 16 }; /* of a column; not a power of two, whose multiples would share sets of the cache */
 
+enum { ES_TREE_PLACES = 2 * 4 * 3 * ES_TREE_BLOCK };
+
 /* The block-th ES_TREE_BLOCK leaves of a tree, or all, if it has fewer. */
 typedef struct es_tree_task {
     uint32_t tree, block;
+    uint32_t vertex_count;      /* a multiple of eight: the last one may be there several times */
     float sum;                  /* of the squared radii of its inner nodes */
 } es_tree_task;
 
@@ -137,6 +139,8 @@ typedef struct es_tree_state {
     uint64_t revision;
     double measure, base;       /* of the tree as it is, and after it was split: squared radii of all inner nodes over the leaves' area */
     uint32_t work;              /* es_tree_work */
+    size_t corner;              /* its first in es_forest_private.corners and .vertices: three for each leaf, a multiple of 24 */
+    bool linked;                /* these are what its leaves need */
     size_t upper;               /* its first in es_forest_private.upper: twice as many nodes as it has blocks, whose roots are the leaves there */
     float low[3], high[3];      /* box of the mesh's vertices in the tree's space */
     bool again;                 /* its root is larger than its frame was made for */
@@ -150,6 +154,11 @@ struct es_forest_private {
     es_leaf_shapes shapes;      /* of the leaves */
     es_tree_task* tasks;
     size_t task_count;
+    uint16_t* corners;          /* es_leaf_job.corners */
+    uint32_t* vertices;         /* of the mesh, for each block as many as it has corners at most */
+    size_t corner_count;
+    float* places;              /* of a block's vertices, and their normals, for each worker: ES_TREE_PLACES */
+    size_t place_count;
     es_node_columns upper;      /* nodes above blocks, of all trees, and those of the tree of trees */
     size_t upper_count;
     es_node_columns scratch;    /* nodes of a block for each worker */
@@ -162,6 +171,8 @@ struct es_forest_private {
 void es_forest_read_looks(es_context* context, es_point_forest* forest, const es_draw_list* list, uint32_t tree);
 /* es_forest_pull's part of lobes. */
 void es_forest_pull_lobes(es_context* context, es_point_forest* forest);
+/* Finds the vertices of blocks of trees that have work and are not linked (tree_link.c). */
+void es_forest_link(es_context* context, es_point_forest* forest);
 /* Does the states' work; with `rest`, measures trees in their pose at rest and nothing else. */
 void es_forest_refit(es_context* context, es_point_forest* forest, bool rest);
 /* Where a tree's leaves are in its own space; points[k].index = k. */

@@ -81,19 +81,17 @@ static void store(const refitting* r, const es_point_tree* tree, const es_node_f
 /* ---- blocks ---------------------------------------------------------------------------------------------------------------------------- */
 
 /* Without columns. */
-static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree* tree, bool rest)
+static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree* tree)
 {
     const es_tree_state* state = &forest->own->states[tree - forest->trees];
     const es_leaf_shapes* shapes = &forest->own->shapes;
     const size_t leaf = tree->first_leaf;
-    es_leaf_job job = {.mesh = state->mesh, .positions = rest && state->mesh->rest_positions ? state->mesh->rest_positions : state->mesh->positions,
-        .side = tree->back ? -1.0f : 1.0f, .triangle = forest->triangle + leaf, .barycentric = forest->barycentric + leaf,
+    es_leaf_job job = {.corners = forest->own->corners + state->corner, .side = tree->back ? -1.0f : 1.0f, .barycentric = forest->barycentric + leaf,
         .shapes = {shapes->along + leaf, shapes->across + leaf, shapes->shear + leaf}, .area = forest->area + tree->first + tree->leaf_count};
-    memcpy(job.u, state->u, sizeof job.u);
     /* over the largest, as cofactors of a tiny scene would underflow */
     float largest = 0.0f, u[9];
-    for (int i = 0; i < 9; i++) largest = es_maxf(largest, es_absf(job.u[i]));
-    for (int i = 0; i < 9; i++) u[i] = largest > 0.0f ? job.u[i] / largest : 0.0f;
+    for (int i = 0; i < 9; i++) largest = es_maxf(largest, es_absf(state->u[i]));
+    for (int i = 0; i < 9; i++) u[i] = largest > 0.0f ? state->u[i] / largest : 0.0f;
     const float cofactors[9] = {u[4] * u[8], -u[3] * u[8], u[3] * u[7] - u[4] * u[6], 0, u[0] * u[8], -u[0] * u[7], 0, 0, u[0] * u[4]};
     memcpy(job.cofactors, cofactors, sizeof cofactors);
     /* a power of two, so that nothing is rounded; a tree that is new, or of one leaf, has no extent yet, its mesh has */
@@ -103,6 +101,19 @@ static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree*
     memcpy(job.rotation, tree->rotation, sizeof job.rotation);
     memcpy(job.translation, tree->translation, sizeof job.translation);
     return job;
+}
+
+/* What a block's leaves read. */
+static void read_vertices(const es_gi_kernels* kernels, const es_point_forest* forest, const es_tree_task* task, bool rest, uint32_t worker, es_leaf_job* job)
+{
+    const es_tree_state* state = &forest->own->states[task->tree];
+    const es_raster_mesh* mesh = state->mesh;
+    const uint32_t* vertices = forest->own->vertices + state->corner + 3 * (size_t)task->block * ES_TREE_BLOCK;
+    float *places = forest->own->places + ES_TREE_PLACES * (size_t)worker, *normals = places + 4 * (size_t)task->vertex_count;
+    kernels->forest_vertices(rest && mesh->rest_positions ? mesh->rest_positions : mesh->positions, state->u, vertices, task->vertex_count, places);
+    if (mesh->normals) kernels->forest_normals(mesh->normals, vertices, task->vertex_count, normals);
+    job->vertices = places;
+    job->normals = mesh->normals ? normals : NULL;
 }
 
 /* `levels` from that of `level` nodes down to that of `last`, whose children are in the scratch's columns; part `part` of `parts` of the tree's. */
@@ -162,7 +173,8 @@ static void refit_block(void* user, uint32_t first, uint32_t last, uint32_t work
         const es_tree_state* state = &forest->own->states[task->tree];
         const uint32_t work = state->work, size = block_size(tree);
         if (!work || (r->again && !state->again)) continue;
-        es_leaf_job job = leaves_of(forest, tree, r->rest);
+        es_leaf_job job = leaves_of(forest, tree);
+        if (work & (ES_TREE_NODES | ES_TREE_POSE)) read_vertices(r->kernels, forest, task, r->rest, worker, &job);
         if (!r->rest && work & ES_TREE_POSE) {
             job.x = forest->x + tree->first_leaf;
             job.y = forest->y + tree->first_leaf;
@@ -252,6 +264,7 @@ void es_forest_refit(es_context* context, es_point_forest* forest, bool rest)
 {
     struct es_forest_private* own = forest->own;
     refitting r = {forest, es_gi_kernel_table(es_context_isa(context)), rest, false};
+    es_forest_link(context, forest);
     if (!rest)
         for (uint32_t i = 0; i < forest->tree_count; i++)
             if (own->states[i].work & ES_TREE_NODES) find_box(context, &r, &own->states[i]);
@@ -271,14 +284,16 @@ void es_forest_refit(es_context* context, es_point_forest* forest, bool rest)
         }
 }
 
-typedef struct standing { const es_gi_kernels* kernels; const es_point_forest* forest; const es_point_tree* tree; es_split_point* points; } standing;
+typedef struct standing { const es_gi_kernels* kernels; const es_point_forest* forest; const es_point_tree* tree; const es_tree_task* tasks; es_split_point* points; } standing;
 
 static void stand_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const standing* s = user;
     const es_node_columns scratch = columns_at(&s->forest->own->scratch, ES_TREE_SCRATCH * (size_t)worker);
-    es_leaf_job job = leaves_of(s->forest, s->tree, false);
+    es_leaf_job job = leaves_of(s->forest, s->tree);
     job.columns = scratch;
+    /* `begin` is that of a block */
+    read_vertices(s->kernels, s->forest, &s->tasks[begin / ES_TREE_BLOCK], false, worker, &job);
     s->kernels->forest_leaves(&job, begin, end);
     for (uint32_t i = begin; i < end; i++) {
         for (int k = 0; k < 3; k++) s->points[i].position[k] = scratch.of[k][i - begin];
@@ -288,7 +303,9 @@ static void stand_some(void* user, uint32_t begin, uint32_t end, uint32_t worker
 
 void es_forest_stand(es_context* context, const es_point_forest* forest, uint32_t tree, es_split_point* points)
 {
-    standing s = {es_gi_kernel_table(es_context_isa(context)), forest, &forest->trees[tree], points};
+    const es_tree_task* tasks = forest->own->tasks;
+    while (tasks->tree != tree) tasks++;
+    standing s = {es_gi_kernel_table(es_context_isa(context)), forest, &forest->trees[tree], tasks, points};
     es_parallel_for(context, s.tree->leaf_count, ES_TREE_BLOCK, stand_some, &s);
 }
 
