@@ -334,7 +334,7 @@ VINL nodes8 merge_nodes(nodes8 l, nodes8 r, bool leaves)
     node.cosine = vf_sqrt(vf_max(vf_set1(1.0f) - node.sine * node.sine, vf_zero()));
     /* rounding of angles */
     slab = slab * vf_set1(1.0f + 1e-6f) + node.radius * vf_set1(5e-7f);
-    node.slab = vf_min(vf_select(vm_gt(node.sine, vf_set1(1.0f)), node.radius, slab), node.radius);
+    node.slab = vf_max(vf_min(vf_select(vm_gt(node.sine, vf_set1(1.0f)), node.radius, slab), node.radius), vf_zero()); /* of none: no negative one */
     return node;
 }
 
@@ -413,7 +413,7 @@ VINL void quantise_some(const rounding* by, const es_node_columns* columns, size
     const vi y = vi_round(vf_min(vf_max((node.centre.y - by->low[1]) * by->inverse[1], vf_zero()), most));
     const vi z = vi_round(vf_min(vf_max((node.centre.z - by->low[2]) * by->inverse[2], vf_zero()), most));
     const vm absent = vm_lt(node.radius, vf_zero());
-    const vi radius = ~absent & vi_min(vi_truncate(vf_min((node.radius + by->error) * by->per_radius, most)) + vi_set1(1), vi_set1(65535));
+    const vi radius = ~absent & vi_min(vi_truncate(vf_clamp((node.radius + by->error) * by->per_radius, vf_zero(), most)) + vi_set1(1), vi_set1(65535));
 
     /* one division for two */
     const vf radius_least = vf_max(node.radius, vf_set1(1e-30f)), sum = vf_max(vf_abs(node.axis.x) + vf_abs(node.axis.y) + vf_abs(node.axis.z), vf_set1(0.5f));
