@@ -230,8 +230,10 @@ static void test_caustic(void** state)
     (void)state;
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
     enum { LEAVES = 4096 };
+    const double most = 0.25; /* of fewer points */
 #else
     enum { LEAVES = 16384 };
+    const double most = 0.2;
 #endif
     strip s = bent_strip(LEAVES, 0.3f);
     const es_point_forest* f = &s.forest;
@@ -271,7 +273,7 @@ static void test_caustic(void** state)
     printf("caustic: relative error %.3f, mean %.3f\n", apart, mean);
     if (!(by_lobes < 0.03)) fail_msg("the leaves' own lobes: relative error %.3f", by_lobes);
     /* that the gutter is a little wider than it is, as pictures of points have it, is in the mean */
-    if (!(apart < 0.2 && fabs(mean - 1) < 0.15)) fail_msg("caustic: relative error %.3f, mean %.3f", apart, mean);
+    if (!(apart < most && fabs(mean - 1) < 0.15)) fail_msg("caustic: relative error %.3f, mean %.3f", apart, mean);
     light_strip(&s, false);
     gather_screen(s.l.w.context, f, points, found);
     const double spread = caustic_error(found, expected, &mean);

@@ -8,7 +8,9 @@
  * for it: E lobe(c) is then the power that goes about the direction which gi/micro/lobe_shape.h has for it. A disc stands for a surface that bends within it; so
  * that few discs do not sparkle, four that are neighbours in the tree are widened by a third of what their axes are spread by among each other, which is how the variance of what is
  * even over each of four squares is to that of their middles, if no edge is between them. A point has one lobe: of several lights the mean direction by the
- * luminance of what each brings, and as wide as these lie apart. */
+ * luminance of what each brings, and as wide as these lie apart.
+ *
+ * Of further bounces radiosity gathers these lobes, so that what they throw is reflected on; what virtual point lights, radiosity and photons add at the points is spread. */
 #ifndef EARTHSHINE_GI_MICRO_LIGHT_H
 #define EARTHSHINE_GI_MICRO_LIGHT_H
 
