@@ -60,8 +60,8 @@
     X(forest_vertices, (const float* positions, const float u[9], const uint32_t* vertices, uint32_t count, float* to)) \
     X(forest_normals, (const float* from, const uint32_t* vertices, uint32_t count, float* to))                  \
     X(forest_leaves, (const es_leaf_job* job, uint32_t begin, uint32_t end))                                     \
-    X(forest_merge, (const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)) \
-    X(forest_quantise, (const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)) \
+    X(forest_merge, (float* nodes, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)) \
+    X(forest_quantise, (const es_node_frame* frame, float* nodes, uint32_t first, uint32_t count, bool leaves, es_point_node* to)) \
     X(forest_pull, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_pack, (const es_node_light* light, uint32_t begin, uint32_t end))                                   \
     X(forest_pull_lobes, (const es_node_lobes* lobes, uint32_t begin, uint32_t end))                             \

@@ -33,12 +33,12 @@ static float wild(float scale)
 
 enum { CORNERS = 96, FACES = 60, LEAVES = 64 };
 
-typedef struct outputs { plane vertices, columns[ES_NODE_COLUMNS], area, world[3], normal, nodes; float sums[2], box[6]; } outputs;
+typedef struct outputs { plane vertices, tree, area, world[3], normal, nodes; float sums[2], box[6]; } outputs;
 
 static outputs new_outputs(void)
 {
     outputs o = {.vertices = new_plane(8 * CORNERS)};
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) o.columns[k] = new_plane(2 * LEAVES);
+    o.tree = new_plane(2 * LEAVES / 8 * ES_NODE_RECORD);
     o.area = new_plane(2 * LEAVES);
     for (int k = 0; k < 3; k++) o.world[k] = new_plane(LEAVES);
     o.normal = new_plane(LEAVES);
@@ -55,7 +55,7 @@ static void compare_planes(plane a, plane b)
 static void free_outputs(outputs* o)
 {
     free(o->vertices.memory);
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) free(o->columns[k].memory);
+    free(o->tree.memory);
     free(o->area.memory);
     for (int k = 0; k < 3; k++) free(o->world[k].memory);
     free(o->normal.memory);
@@ -73,9 +73,7 @@ static void make_nodes(const es_gi_kernels* kernels, const block* b, es_leaf_job
         kernels->forest_normals(b->normals, b->vertices, CORNERS, at(o->vertices) + 4 * CORNERS);
         job.normals = at(o->vertices) + 4 * CORNERS;
     }
-    es_node_columns columns;
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) columns.of[k] = at(o->columns[k]);
-    job.columns = columns;
+    job.nodes = at(o->tree);
     job.first = leaves;
     job.area = at(o->area) + leaves;
     job.x = at(o->world[0]);
@@ -84,14 +82,13 @@ static void make_nodes(const es_gi_kernels* kernels, const block* b, es_leaf_job
     job.normal = (uint32_t*)at(o->normal);
     kernels->forest_box(b->positions, b->u, 0, CORNERS - 3, o->box, o->box + 3);
     kernels->forest_leaves(&job, 0, leaves);
-    for (uint32_t level = leaves / 2; level; level /= 2) kernels->forest_merge(&columns, level, level == leaves / 2, at(o->area) + 2 * level, at(o->area) + level, &o->sums[level % 2]);
+    for (uint32_t level = leaves / 2; level; level /= 2) kernels->forest_merge(job.nodes, level, level == leaves / 2, at(o->area) + 2 * level, at(o->area) + level, &o->sums[level % 2]);
     es_node_frame frame = {.radius_step = 4.0f / 65535.0f, .error = 1e-4f};
     for (int k = 0; k < 3; k++) {
         frame.low[k] = -2.0f;
         frame.step[k] = k == 1 ? 0.0f : 4.0f / 65535.0f;
     }
-    kernels->forest_quantise(&frame, &columns, 1, leaves - 1, false, (es_point_node*)at(o->nodes) + 1);
-    kernels->forest_quantise(&frame, &columns, leaves, leaves, true, (es_point_node*)at(o->nodes) + leaves);
+    for (uint32_t level = leaves; level; level /= 2) kernels->forest_quantise(&frame, job.nodes, level, level, level == leaves, (es_point_node*)at(o->nodes) + level);
 }
 
 static void check_nodes(void** state)
@@ -122,13 +119,13 @@ static void check_nodes(void** state)
         outputs expected = new_outputs();
         make_nodes(es_gi_kernel_table(ES_ISA_SCALAR), &b, job, leaves, &expected);
         for (uint32_t i = leaves; i < 2 * leaves; i++)
-            for (int k = 0; k < ES_NODE_COLUMNS; k++) assert_true(isfinite(at(expected.columns[k])[i]));
+            for (int k = 0; k < ES_NODE_VALUES; k++) assert_true(isfinite(*es_node_value(at(expected.tree), i, k)));
         for (uint32_t isa = ES_ISA_SCALAR; isa < ES_ISA_COUNT; isa++) {
             if (!(es_isa_available_mask() & 1u << isa)) continue;
             outputs o = new_outputs();
             make_nodes(es_gi_kernel_table((es_isa)isa), &b, job, leaves, &o);
             compare_planes(expected.vertices, o.vertices);
-            for (int k = 0; k < ES_NODE_COLUMNS; k++) compare_planes(expected.columns[k], o.columns[k]);
+            compare_planes(expected.tree, o.tree);
             for (int k = 0; k < 3; k++) compare_planes(expected.world[k], o.world[k]);
             compare_planes(expected.area, o.area);
             compare_planes(expected.normal, o.normal);

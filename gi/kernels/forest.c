@@ -90,26 +90,33 @@ typedef struct nodes8 {
     v3 centre, axis;
     vf radius, sine, slab, cosine;
 } nodes8;
-VINL nodes8 load_nodes(const es_node_columns* c, size_t first, uint32_t n)
+/* n of a record: all from its first on, or some of one */
+VINL nodes8 load_nodes(float* nodes, size_t first, uint32_t n)
 {
-    return (nodes8){
-        {load_floats(c->of[ES_NODE_X] + first, n), load_floats(c->of[ES_NODE_Y] + first, n), load_floats(c->of[ES_NODE_Z] + first, n)},
-        {load_floats(c->of[ES_NODE_AXIS_X] + first, n), load_floats(c->of[ES_NODE_AXIS_Y] + first, n), load_floats(c->of[ES_NODE_AXIS_Z] + first, n)},
-        load_floats(c->of[ES_NODE_RADIUS] + first, n), load_floats(c->of[ES_NODE_SINE] + first, n), load_floats(c->of[ES_NODE_SLAB] + first, n),
-        load_floats(c->of[ES_NODE_COSINE] + first, n)};
+    const float* p = es_node_value(nodes, first, 0);
+    return (nodes8){{load_floats(p + 8 * ES_NODE_X, n), load_floats(p + 8 * ES_NODE_Y, n), load_floats(p + 8 * ES_NODE_Z, n)},
+        {load_floats(p + 8 * ES_NODE_AXIS_X, n), load_floats(p + 8 * ES_NODE_AXIS_Y, n), load_floats(p + 8 * ES_NODE_AXIS_Z, n)}, load_floats(p + 8 * ES_NODE_RADIUS, n),
+        load_floats(p + 8 * ES_NODE_SINE, n), load_floats(p + 8 * ES_NODE_SLAB, n), load_floats(p + 8 * ES_NODE_COSINE, n)};
 }
-VINL void store_nodes(const es_node_columns* c, size_t first, uint32_t n, nodes8 node)
+VINL void store_nodes(float* nodes, size_t first, uint32_t n, nodes8 node)
 {
-    store_floats(c->of[ES_NODE_X] + first, n, node.centre.x);
-    store_floats(c->of[ES_NODE_Y] + first, n, node.centre.y);
-    store_floats(c->of[ES_NODE_Z] + first, n, node.centre.z);
-    store_floats(c->of[ES_NODE_RADIUS] + first, n, node.radius);
-    store_floats(c->of[ES_NODE_AXIS_X] + first, n, node.axis.x);
-    store_floats(c->of[ES_NODE_AXIS_Y] + first, n, node.axis.y);
-    store_floats(c->of[ES_NODE_AXIS_Z] + first, n, node.axis.z);
-    store_floats(c->of[ES_NODE_SINE] + first, n, node.sine);
-    store_floats(c->of[ES_NODE_SLAB] + first, n, node.slab);
-    store_floats(c->of[ES_NODE_COSINE] + first, n, node.cosine);
+    float* p = es_node_value(nodes, first, 0);
+    store_floats(p + 8 * ES_NODE_X, n, node.centre.x);
+    store_floats(p + 8 * ES_NODE_Y, n, node.centre.y);
+    store_floats(p + 8 * ES_NODE_Z, n, node.centre.z);
+    store_floats(p + 8 * ES_NODE_RADIUS, n, node.radius);
+    store_floats(p + 8 * ES_NODE_AXIS_X, n, node.axis.x);
+    store_floats(p + 8 * ES_NODE_AXIS_Y, n, node.axis.y);
+    store_floats(p + 8 * ES_NODE_AXIS_Z, n, node.axis.z);
+    store_floats(p + 8 * ES_NODE_SINE, n, node.sine);
+    store_floats(p + 8 * ES_NODE_SLAB, n, node.slab);
+    store_floats(p + 8 * ES_NODE_COSINE, n, node.cosine);
+}
+/* a value of n pairs of nodes: of two records, or of some of one */
+VINL void load_children(const float* p, int value, uint32_t n, vf* left, vf* right)
+{
+    if (n == VW) vf_deinterleave(vf_load(p + 8 * value), vf_load(p + 8 * value + ES_NODE_RECORD), left, right);
+    else load_pairs(p + 8 * value, n, left, right);
 }
 VINL nodes8 select_nodes(vm m, nodes8 yes, nodes8 no)
 {
@@ -200,8 +207,20 @@ VINL v3 record(const float* records, vi corners)
     return a;
 }
 
+/* Nodes of leaves and of the levels above them, which are written when a part is complete: by then they are in the cache. */
+VINL void fetch_nodes(const es_leaf_job* job, uint32_t i)
+{
+    const uint32_t node = job->leaf_count + i;
+    __builtin_prefetch(job->packed + node, 1);
+    __builtin_prefetch(job->packed + node + VW / 2, 1);
+    __builtin_prefetch(job->packed + node / 2, 1);
+    __builtin_prefetch(job->packed + node / 4, 1);
+    __builtin_prefetch(job->packed + node / 8, 1);
+}
+
 VINL void make_leaves(const es_leaf_job* job, uint32_t i, uint32_t node, uint32_t n)
 {
+    if (job->packed) fetch_nodes(job, i);
     const vf one = vf_set1(1.0f), side = vf_set1(job->side), magnify = vf_set1(job->magnify);
     const uint16_t* corners = job->corners + 3 * (size_t)i;
     const vi packed = load_words(job->barycentric + i, n), ia = load_corners(corners), ib = load_corners(corners + VW), ic = load_corners(corners + 2 * VW);
@@ -230,7 +249,7 @@ VINL void make_leaves(const es_leaf_job* job, uint32_t i, uint32_t node, uint32_
         store_floats(job->z + i, n, world.z + vf_set1(job->translation[2]));
         store_words(job->normal + i, n, es_pack_normal_v(turned.x, turned.y, turned.z));
     }
-    if (!job->columns.of[0]) return;
+    if (!job->nodes) return;
 
     /* the disc's axes */
     const vf along = load_floats(job->shapes.along + i, n), across = load_floats(job->shapes.across + i, n), shear = load_floats(job->shapes.shear + i, n);
@@ -241,7 +260,7 @@ VINL void make_leaves(const es_leaf_job* job, uint32_t i, uint32_t node, uint32_
     const vf g11 = v3_dot(t1, t1), g22 = v3_dot(t2, t2), g12 = v3_dot(t1, t2), difference = g11 - g22;
     const vf larger = vf_set1(0.5f) * (g11 + g22 + vf_sqrt(vf_min(difference * difference + vf_set1(4.0f) * (g12 * g12), vf_set1(1e37f))));
     const vf radius = vf_sqrt(vf_min(vf_min(larger, vf_set1(ES_POINT_STRETCH) * circle), vf_set1(1e18f)));
-    store_nodes(&job->columns, node, n, (nodes8){.centre = p, .axis = normal, .radius = vf_select(hole, vf_set1(-1.0f), radius), .cosine = one});
+    store_nodes(job->nodes, node, n, (nodes8){.centre = p, .axis = normal, .radius = vf_select(hole, vf_set1(-1.0f), radius), .cosine = one});
     store_floats(job->area + i, n, vf_select(hole, vf_zero(), vf_min(circle * vf_set1(3.14159265f / (ES_POINT_OVERLAP * ES_POINT_OVERLAP)), vf_set1(1e18f))));
 }
 
@@ -339,46 +358,46 @@ VINL nodes8 merge_nodes(nodes8 l, nodes8 r, bool leaves)
 }
 
 /* Nodes [i, i + n) of a level; their squared radii. */
-VINL vf merge_some(const es_node_columns* c, uint32_t level, uint32_t i, uint32_t n, bool leaves, const float* child_area, float* area)
+VINL vf merge_some(float* nodes, uint32_t level, uint32_t i, uint32_t n, bool leaves, const float* child_area, float* area)
 {
-    const size_t child = 2 * (size_t)(level + i);
+    const float* child = es_node_value(nodes, 2 * (size_t)(level + i), 0);
     nodes8 l, r;
     vf left_area, right_area;
-    load_pairs(c->of[ES_NODE_X] + child, n, &l.centre.x, &r.centre.x);
-    load_pairs(c->of[ES_NODE_Y] + child, n, &l.centre.y, &r.centre.y);
-    load_pairs(c->of[ES_NODE_Z] + child, n, &l.centre.z, &r.centre.z);
-    load_pairs(c->of[ES_NODE_RADIUS] + child, n, &l.radius, &r.radius);
-    load_pairs(c->of[ES_NODE_AXIS_X] + child, n, &l.axis.x, &r.axis.x);
-    load_pairs(c->of[ES_NODE_AXIS_Y] + child, n, &l.axis.y, &r.axis.y);
-    load_pairs(c->of[ES_NODE_AXIS_Z] + child, n, &l.axis.z, &r.axis.z);
+    load_children(child, ES_NODE_X, n, &l.centre.x, &r.centre.x);
+    load_children(child, ES_NODE_Y, n, &l.centre.y, &r.centre.y);
+    load_children(child, ES_NODE_Z, n, &l.centre.z, &r.centre.z);
+    load_children(child, ES_NODE_RADIUS, n, &l.radius, &r.radius);
+    load_children(child, ES_NODE_AXIS_X, n, &l.axis.x, &r.axis.x);
+    load_children(child, ES_NODE_AXIS_Y, n, &l.axis.y, &r.axis.y);
+    load_children(child, ES_NODE_AXIS_Z, n, &l.axis.z, &r.axis.z);
     l.sine = r.sine = l.slab = r.slab = vf_zero();
     l.cosine = r.cosine = vf_set1(1.0f);
     if (!leaves) {
-        load_pairs(c->of[ES_NODE_SINE] + child, n, &l.sine, &r.sine);
-        load_pairs(c->of[ES_NODE_SLAB] + child, n, &l.slab, &r.slab);
-        load_pairs(c->of[ES_NODE_COSINE] + child, n, &l.cosine, &r.cosine);
+        load_children(child, ES_NODE_SINE, n, &l.sine, &r.sine);
+        load_children(child, ES_NODE_SLAB, n, &l.slab, &r.slab);
+        load_children(child, ES_NODE_COSINE, n, &l.cosine, &r.cosine);
     }
     const nodes8 node = merge_nodes(l, r, leaves);
-    store_nodes(c, level + i, n, node);
+    store_nodes(nodes, level + i, n, node);
     load_pairs(child_area + 2 * (size_t)i, n, &left_area, &right_area);
     store_floats(area + i, n, left_area + right_area);
     return vf_and(vm_first((int32_t)n) & vm_gt(node.radius, vf_zero()), node.radius * node.radius);
 }
 
-VINL float merge_level(const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area)
+VINL float merge_level(float* nodes, uint32_t level, bool leaves, const float* child_area, float* area)
 {
     vf total = vf_zero();
     uint32_t i = 0;
-    for (; i + VW <= level; i += VW) total = total + merge_some(columns, level, i, VW, leaves, child_area, area);
-    if (i < level) total = total + merge_some(columns, level, i, level - i, leaves, child_area, area);
+    for (; i + VW <= level; i += VW) total = total + merge_some(nodes, level, i, VW, leaves, child_area, area);
+    if (i < level) total = total + merge_some(nodes, level, i, level - i, leaves, child_area, area);
     return vf_sum(total);
 }
 
 /* The level of `level` nodes, from their children, which may be leaves: sphere, cone, slab and area (of the level's first, and of its children's first). *sum is the sum
  * of their squared radii. */
-void ES_KERNEL(es_gi_forest_merge)(const es_node_columns* columns, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)
+void ES_KERNEL(es_gi_forest_merge)(float* nodes, uint32_t level, bool leaves, const float* child_area, float* area, float* sum)
 {
-    *sum = leaves ? merge_level(columns, level, true, child_area, area) : merge_level(columns, level, false, child_area, area);
+    *sum = leaves ? merge_level(nodes, level, true, child_area, area) : merge_level(nodes, level, false, child_area, area);
 }
 
 /* s of es_point_node.cone, of a cone about `axis`, which is decoded from the words but not yet of unit length. */
@@ -405,10 +424,9 @@ VINL vi cone_bits(v3 axis, vf sum, const nodes8* node, bool leaves)
 
 typedef struct rounding { vf low[3], inverse[3], per_radius, error; } rounding;
 
-VINL void quantise_some(const rounding* by, const es_node_columns* columns, size_t first, uint32_t n, bool leaves, es_point_node* nodes)
+VINL void quantise_some(const rounding* by, nodes8 node, uint32_t n, bool leaves, es_point_node* to)
 {
     const vf one = vf_set1(1.0f), most = vf_set1(65535.0f);
-    const nodes8 node = load_nodes(columns, first, n);
     const vi x = vi_round(vf_min(vf_max((node.centre.x - by->low[0]) * by->inverse[0], vf_zero()), most));
     const vi y = vi_round(vf_min(vf_max((node.centre.y - by->low[1]) * by->inverse[1], vf_zero()), most));
     const vi z = vi_round(vf_min(vf_max((node.centre.z - by->low[2]) * by->inverse[2], vf_zero()), most));
@@ -437,14 +455,14 @@ VINL void quantise_some(const rounding* by, const es_node_columns* columns, size
     /* records of four words; their light is left as it is */
     const vi words[3] = {x | y << 16, z | radius << 16, cone};
     if (n == VW) {
-        vf_store3((float*)nodes, vf_from_bits(words[0]), vf_from_bits(words[1]), vf_from_bits(words[2]));
+        vf_store3((float*)to, vf_from_bits(words[0]), vf_from_bits(words[1]), vf_from_bits(words[2]));
         return;
     }
     for (uint32_t k = 0; k < n; k++)
-        for (int w = 0; w < 3; w++) memcpy((char*)(nodes + k) + 4 * w, (const char*)&words[w] + 4 * k, 4);
+        for (int w = 0; w < 3; w++) memcpy((char*)(to + k) + 4 * w, (const char*)&words[w] + 4 * k, 4);
 }
 
-VINL void quantise(const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)
+VINL void quantise(const es_node_frame* frame, float* nodes, uint32_t first, uint32_t count, bool leaves, es_point_node* to)
 {
     rounding by = {.per_radius = vf_set1(frame->radius_step > 0.0f ? 1.0f / frame->radius_step * (1.0f + 1e-6f) : 0.0f), .error = vf_set1(frame->error)};
     for (int k = 0; k < 3; k++) {
@@ -452,15 +470,15 @@ VINL void quantise(const es_node_frame* frame, const es_node_columns* columns, u
         by.low[k] = vf_set1(frame->low[k]);
     }
     uint32_t i = 0;
-    for (; i + VW <= count; i += VW) quantise_some(&by, columns, first + i, VW, leaves, nodes + i);
-    if (i < count) quantise_some(&by, columns, first + i, count - i, leaves, nodes + i);
+    for (; i + VW <= count; i += VW) quantise_some(&by, load_nodes(nodes, first + i, VW), VW, leaves, to + i);
+    if (i < count) quantise_some(&by, load_nodes(nodes, first + i, count - i), count - i, leaves, to + i);
 }
 
-/* `count` nodes of the columns from `first` on, all of them leaves or none. */
-void ES_KERNEL(es_gi_forest_quantise)(const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t count, bool leaves, es_point_node* nodes)
+/* `count` nodes from `first` on, all of them leaves or none: whole records, or some of one. */
+void ES_KERNEL(es_gi_forest_quantise)(const es_node_frame* frame, float* nodes, uint32_t first, uint32_t count, bool leaves, es_point_node* to)
 {
-    if (leaves) quantise(frame, columns, first, count, true, nodes);
-    else quantise(frame, columns, first, count, false, nodes);
+    if (leaves) quantise(frame, nodes, first, count, true, to);
+    else quantise(frame, nodes, first, count, false, to);
 }
 
 /* Light of parents [begin, end) from their children's, by area. */

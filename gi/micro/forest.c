@@ -157,7 +157,7 @@ static void list_arrays(es_point_forest* f, array out[ARRAYS])
         {(void**)&f->albedo_rg, leaves, sizeof(uint32_t)}, {(void**)&f->albedo_b, leaves, sizeof(uint32_t)}, {(void**)&f->surface, leaves, sizeof(uint32_t)},
         {(void**)&f->triangle, leaves, sizeof(uint32_t)}, {(void**)&f->barycentric, leaves, sizeof(uint32_t)}, {(void**)&own->shapes.along, 3 * leaves, sizeof(float)},
         {(void**)&own->corners, own->corner_count, sizeof(uint16_t)}, {(void**)&own->vertices, own->corner_count, sizeof(uint32_t)}, {(void**)&own->places, own->place_count, sizeof(float)},
-        {(void**)&own->upper.of[0], ES_NODE_COLUMNS * own->upper_count, sizeof(float)}, {(void**)&own->scratch.of[0], ES_NODE_COLUMNS * own->scratch_count, sizeof(float)}};
+        {(void**)&own->upper, own->upper_count / 8 * ES_NODE_RECORD, sizeof(float)}, {(void**)&own->scratch, own->scratch_count, sizeof(float)}};
     memcpy(out, all, sizeof all);
 }
 
@@ -166,7 +166,6 @@ static void forget_counts(es_point_forest* forest)
 {
     struct es_forest_private* own = forest->own;
     own->shapes = (es_leaf_shapes){0};
-    own->upper = own->scratch = (es_node_columns){{0}};
     own->task_count = own->corner_count = own->place_count = own->upper_count = own->scratch_count = 0;
     forest->tree_count = 0;
     forest->node_count = forest->leaf_count = 0;
@@ -211,11 +210,6 @@ static es_result allocate_arrays(es_context* context, es_point_forest* forest)
     const size_t leaves = padded(forest->leaf_count);
     forest->own->shapes.across = forest->own->shapes.along + leaves;
     forest->own->shapes.shear = forest->own->shapes.along + 2 * leaves;
-    struct es_forest_private* own = forest->own;
-    for (size_t k = 1; k < ES_NODE_COLUMNS; k++) {
-        own->upper.of[k] = own->upper.of[0] + k * own->upper_count;
-        own->scratch.of[k] = own->scratch.of[0] + k * own->scratch_count;
-    }
     return ES_OK;
 }
 
@@ -271,7 +265,7 @@ static void take_tree(es_point_forest* to, uint32_t new_tree, const es_point_for
     to->own->states[new_tree].corner = corner;
     to->own->states[new_tree].linked = false;
     to->own->states[new_tree].upper = upper;
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) copy_words(to->own->upper.of[k], upper, from->own->upper.of[k], old_upper, 2 * (size_t)blocks, sizeof(float));
+    copy_words(to->own->upper, upper / 8, from->own->upper, old_upper / 8, padded(2 * (size_t)blocks) / 8, ES_NODE_RECORD * sizeof(float));
     copy_words(to->nodes, first, from->nodes, old->first, nodes, sizeof *to->nodes);
     if (to->own->floats && from->own->floats) copy_words(to->float_nodes, first, from->float_nodes, old->first, nodes, sizeof *to->float_nodes);
     else if (to->own->floats) to->own->states[new_tree].revision = UINT64_MAX; /* they have to be made */
@@ -297,6 +291,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
         next.leaf_count += (size_t)1 << shares[i].leaves;
         own.task_count += tasks_of(1u << shares[i].leaves);
         own.corner_count += corners_of(1u << shares[i].leaves);
+        own.top_upper += padded(2 * (size_t)tasks_of(1u << shares[i].leaves));
     }
     next.top.leaf_count = next.tree_count ? 1 : 0;
     while (next.top.leaf_count < next.tree_count) next.top.leaf_count *= 2;
@@ -305,7 +300,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
     next.top.first_leaf = next.leaf_count;
     next.top.instance = UINT32_MAX;
     next.top.rotation[0] = next.top.rotation[4] = next.top.rotation[8] = 1.0f;
-    own.upper_count = 2 * (own.task_count + next.top.leaf_count);
+    own.upper_count = own.top_upper + padded(2 * (size_t)next.top.leaf_count);
     own.place_count = ES_TREE_PLACES * (size_t)es_context_workers(context);
     own.scratch_count = ES_TREE_SCRATCH * (size_t)es_context_workers(context);
     if (!next.tree_count) {
@@ -316,13 +311,13 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
     es_result result = allocate_arrays(context, &next);
     if (result) return result;
     uint32_t tree = 0, task = 0, old = 0;
-    size_t leaf = 0, corner = 0;
+    size_t leaf = 0, corner = 0, upper = 0;
     for (uint32_t i = 0; i < 2 * list->instance_count; i++) {
         if (shares[i].leaves == UINT32_MAX) continue;
         const uint32_t leaves = 1u << shares[i].leaves, id = sources[i / 2].id;
         const bool back = i % 2 == 1;
         next.trees[tree] = (es_point_tree){.instance = i / 2, .back = back, .leaf_count = leaves, .first = 2 * leaf, .first_leaf = leaf};
-        own.states[tree] = (es_tree_state){.id = id, .source = i / 2, .corner = corner, .upper = 2 * (size_t)task};
+        own.states[tree] = (es_tree_state){.id = id, .source = i / 2, .corner = corner, .upper = upper};
         for (uint32_t turn = 0; turn < forest->tree_count; turn++, old++) {
             if (old >= forest->tree_count) old = 0;
             if (forest->own->states[old].id != id || forest->trees[old].back != back || forest->trees[old].leaf_count != leaves) continue;
@@ -333,6 +328,7 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
         tree++;
         leaf += leaves;
         corner += corners_of(leaves);
+        upper += padded(2 * (size_t)tasks_of(leaves));
     }
     free_arrays(context, forest);
     struct es_forest_private* kept = forest->own;

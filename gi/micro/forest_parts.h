@@ -7,9 +7,10 @@
 
 /* ---- for the kernels ------------------------------------------------------------------------------------------------------------------ */
 
-/* Nodes of a complete tree in columns, as in a heap: node 1 is the root, node i has children 2i and 2i + 1. */
-enum { ES_NODE_X, ES_NODE_Y, ES_NODE_Z, ES_NODE_RADIUS, ES_NODE_AXIS_X, ES_NODE_AXIS_Y, ES_NODE_AXIS_Z, ES_NODE_SINE, ES_NODE_SLAB, ES_NODE_COSINE, ES_NODE_COLUMNS };
-typedef struct es_node_columns { float* of[ES_NODE_COLUMNS]; } es_node_columns;
+/* Nodes of a complete tree as in a heap: node 1 is the root, node i has children 2i and 2i + 1. Eight nodes that follow each other are a record: their x, their y … */
+enum { ES_NODE_X, ES_NODE_Y, ES_NODE_Z, ES_NODE_RADIUS, ES_NODE_AXIS_X, ES_NODE_AXIS_Y, ES_NODE_AXIS_Z, ES_NODE_SINE, ES_NODE_SLAB, ES_NODE_COSINE, ES_NODE_VALUES };
+enum { ES_NODE_RECORD = 8 * ES_NODE_VALUES }; /* floats */
+static inline float* es_node_value(float* nodes, size_t node, int value) { return nodes + node / 8 * ES_NODE_RECORD + 8 * value + node % 8; }
 
 /* A disc's shape follows its triangle. With u = b - a, v = c - a of the triangle as it is now, its axes are
  *     t1 = along · u,   t2 = across · (v - shear · u),
@@ -26,9 +27,11 @@ typedef struct es_leaf_job {
     float side;                        /* 1: front, -1: back */
     const uint32_t* barycentric;
     es_leaf_shapes shapes;
-    es_node_columns columns;           /* leaf `begin` is node `first`; NULL: places in the world only */
+    float* nodes;                      /* leaf `begin` is node `first`; NULL: places in the world only */
     uint32_t first;
-    float* area;                       /* of leaf 0; with columns */
+    float* area;                       /* of leaf 0; with nodes */
+    const es_point_node* packed;       /* the tree's, which are asked for ahead of what writes them; NULL: none */
+    uint32_t leaf_count;               /* the tree's; with packed */
     float rotation[9], translation[3];
     float *x, *y, *z;                  /* NULL: nodes only */
     uint32_t* normal;
@@ -111,7 +114,7 @@ void es_tree_split_any(es_split_point* points, uint32_t count);
 /* ---- nodes ------------------------------------------------------------------------------------------------------------------------------------- */
 
 enum { ES_TREE_BLOCK = 2048 };  /* leaves that one task takes with all nodes above them; a power of two */
-enum { ES_TREE_SCRATCH = 2 * ES_TREE_BLOCK + 16 }; /* of a column; not a power of two, whose multiples would share sets of the cache */
+enum { ES_TREE_SCRATCH = 2 * ES_TREE_BLOCK / 8 * ES_NODE_RECORD };
 
 enum { ES_TREE_PLACES = 2 * 4 * 3 * ES_TREE_BLOCK };
 
@@ -141,7 +144,7 @@ typedef struct es_tree_state {
     uint32_t work;              /* es_tree_work */
     size_t corner;              /* its first in es_forest_private.corners and .vertices: three for each leaf, a multiple of 24 */
     bool linked;                /* these are what its leaves need */
-    size_t upper;               /* its first in es_forest_private.upper: twice as many nodes as it has blocks, whose roots are the leaves there */
+    size_t upper;               /* its first in es_forest_private.upper: whole records of twice as many nodes as it has blocks, whose roots are the leaves there */
     float low[3], high[3];      /* box of the mesh's vertices in the tree's space */
     bool again;                 /* its root is larger than its frame was made for */
     bool plain;                 /* all leaves have the same looks, and so have all nodes */
@@ -159,9 +162,9 @@ struct es_forest_private {
     size_t corner_count;
     float* places;              /* of a block's vertices, and their normals, for each worker: ES_TREE_PLACES */
     size_t place_count;
-    es_node_columns upper;      /* nodes above blocks, of all trees, and those of the tree of trees */
-    size_t upper_count;
-    es_node_columns scratch;    /* nodes of a block for each worker */
+    float* upper;               /* nodes above blocks, of all trees, and those of the tree of trees */
+    size_t upper_count, top_upper; /* nodes; the first of the tree of trees */
+    float* scratch;             /* nodes of a block for each worker: ES_TREE_SCRATCH */
     size_t scratch_count;
     bool floats;                /* float nodes are kept */
     uint64_t materials;

@@ -1,6 +1,6 @@
 /* Nodes of the trees, from the leaves up: blocks of leaves with what is above them, in parallel, then what is above the blocks.
  *
- * A block's nodes are made in columns that stay in the cache, and rounded from there. Of a tree of several blocks the frame of the rounding is known before its
+ * A block's nodes are made where they stay in the cache, and rounded from there. Of a tree of several blocks the frame of the rounding is known before its
  * root is: centres are within the box of the vertices, as each is between its children's, and radii are taken to be below ES_TREE_REACH times the box'
  * diagonal. A tree whose root is larger is done again. */
 #include <string.h>
@@ -20,13 +20,6 @@ typedef struct refitting {
     const es_gi_kernels* kernels;
     bool rest, again;
 } refitting;
-
-static es_node_columns columns_at(const es_node_columns* columns, size_t first)
-{
-    es_node_columns at;
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) at.of[k] = columns->of[k] + first;
-    return at;
-}
 
 static es_node_looks looks_of(const es_point_forest* forest, const es_point_tree* tree) { return (es_node_looks){forest->albedo + tree->first, forest->emission + tree->first, forest->area + tree->first}; }
 static es_node_light light_of(const es_point_forest* forest, const es_point_tree* tree)
@@ -65,22 +58,22 @@ static void keep_frame(es_point_tree* tree, const es_node_frame* frame)
     tree->radius_step = frame->radius_step;
 }
 
-/* `count` nodes of the columns from `first` on become those of the tree from `node` on. */
-static void store(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, const es_node_columns* columns, uint32_t first, uint32_t node, uint32_t count, bool leaves)
+/* Of a block or of what is above, `count` nodes from `first` on, whole records or some of one, become the tree's from `node` on. */
+static void store(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, float* nodes, uint32_t first, uint32_t node, uint32_t count, bool leaves)
 {
     es_point_forest* forest = r->forest;
-    r->kernels->forest_quantise(frame, columns, first, count, leaves, forest->nodes + tree->first + node);
+    r->kernels->forest_quantise(frame, nodes, first, count, leaves, forest->nodes + tree->first + node);
     if (!forest->own->floats) return;
     for (uint32_t i = 0; i < count; i++) {
         es_point_node_float* out = &forest->float_nodes[tree->first + node + i];
         float* const to[ES_NODE_COSINE] = {&out->position[0], &out->position[1], &out->position[2], &out->radius, &out->axis[0], &out->axis[1], &out->axis[2], &out->sine, &out->slab};
-        for (int k = 0; k < ES_NODE_COSINE; k++) *to[k] = columns->of[k][first + i];
+        for (int k = 0; k < ES_NODE_COSINE; k++) *to[k] = *es_node_value(nodes, first + i, k);
     }
 }
 
 /* ---- blocks ---------------------------------------------------------------------------------------------------------------------------- */
 
-/* Without columns. */
+/* Without nodes. */
 static es_leaf_job leaves_of(const es_point_forest* forest, const es_point_tree* tree)
 {
     const es_tree_state* state = &forest->own->states[tree - forest->trees];
@@ -116,25 +109,25 @@ static void read_vertices(const es_gi_kernels* kernels, const es_point_forest* f
     job->normals = mesh->normals ? normals : NULL;
 }
 
-/* `levels` from that of `level` nodes down to that of `last`, whose children are in the scratch's columns; part `part` of `parts` of the tree's. */
-static float make_levels(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, const es_node_columns* columns, uint32_t part, uint32_t parts, uint32_t level, uint32_t last)
+/* `levels` from that of `level` nodes down to that of `last`, whose children are among `nodes`; part `part` of `parts` of the tree's. */
+static float make_levels(const refitting* r, const es_point_tree* tree, const es_node_frame* frame, float* nodes, uint32_t part, uint32_t parts, uint32_t level, uint32_t last)
 {
     float* area = r->forest->area + tree->first;
     float sum = 0.0f;
     for (; level >= last && level; level /= 2) {
         const uint32_t at = (parts + part) * level;
         float squares;
-        r->kernels->forest_merge(columns, level, 2 * at >= tree->leaf_count, area + 2 * (size_t)at, area + at, &squares);
+        r->kernels->forest_merge(nodes, level, 2 * at >= tree->leaf_count, area + 2 * (size_t)at, area + at, &squares);
         sum += squares;
-        if (frame) store(r, tree, frame, columns, level, at, level, false);
+        if (frame) store(r, tree, frame, nodes, level, at, level, false);
     }
     return sum;
 }
 
-/* A block is made in parts whose columns stay in the first cache, each up to as many nodes as the kernels take at once. */
+/* A block is made in parts that stay in the first cache, each up to as many nodes as the kernels take at once. */
 enum { PART = 256, PART_ROOTS = 8 };
 
-static void make_block(const refitting* r, es_tree_task* task, const es_point_tree* tree, es_leaf_job* job, const es_node_columns* scratch)
+static void make_block(const refitting* r, es_tree_task* task, const es_point_tree* tree, es_leaf_job* job, float* scratch)
 {
     es_point_forest* forest = r->forest;
     const es_tree_state* state = &forest->own->states[task->tree];
@@ -142,23 +135,25 @@ static void make_block(const refitting* r, es_tree_task* task, const es_point_tr
     /* of a tree of one block the frame is known when all else is */
     const uint32_t part = blocks > 1 ? PART : size, parts = size / part;
     es_node_frame frame;
-    if (blocks > 1) frame = frame_of(state->low, state->high, r->again ? es_maxf(forest->own->upper.of[ES_NODE_RADIUS][state->upper + 1], 0.0f) : ES_TREE_REACH * diagonal(state));
+    if (blocks > 1) frame = frame_of(state->low, state->high, r->again ? es_maxf(*es_node_value(forest->own->upper, state->upper + 1, ES_NODE_RADIUS), 0.0f) : ES_TREE_REACH * diagonal(state));
     const es_node_frame* known = blocks > 1 && !r->rest ? &frame : NULL;
-    const es_node_columns top = columns_at(scratch, parts > 1 ? 2 * PART : 0);
-    job->columns = *scratch;
+    float* top = es_node_value(scratch, parts > 1 ? 2 * PART : 0, 0);
+    job->nodes = scratch;
     job->first = part;
+    if (known) job->packed = forest->nodes + tree->first;
+    job->leaf_count = tree->leaf_count;
     task->sum = 0.0f;
     for (uint32_t i = 0; i < parts; i++) {
         const uint32_t leaf = begin + i * part, number = task->block * parts + i;
         r->kernels->forest_leaves(job, leaf, leaf + part);
         if (known) store(r, tree, known, scratch, part, tree->leaf_count + leaf, part, true);
         task->sum += make_levels(r, tree, known, scratch, number, blocks * parts, part / 2, parts > 1 ? PART_ROOTS : 1);
-        for (int k = 0; k < ES_NODE_COLUMNS && parts > 1; k++) memcpy(top.of[k] + (parts + i) * PART_ROOTS, scratch->of[k] + PART_ROOTS, PART_ROOTS * sizeof(float));
+        if (parts > 1) memcpy(es_node_value(top, (parts + i) * PART_ROOTS, 0), es_node_value(scratch, PART_ROOTS, 0), ES_NODE_RECORD * sizeof(float));
     }
-    if (parts > 1) task->sum += make_levels(r, tree, known, &top, task->block, blocks, parts * PART_ROOTS / 2, 1);
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) forest->own->upper.of[k][state->upper + blocks + task->block] = top.of[k][1];
+    if (parts > 1) task->sum += make_levels(r, tree, known, top, task->block, blocks, parts * PART_ROOTS / 2, 1);
+    for (int k = 0; k < ES_NODE_VALUES; k++) *es_node_value(forest->own->upper, state->upper + blocks + task->block, k) = *es_node_value(top, 1, k);
     if (blocks > 1 || r->rest) return;
-    frame = frame_of(state->low, state->high, es_maxf(scratch->of[ES_NODE_RADIUS][1], 0.0f));
+    frame = frame_of(state->low, state->high, es_maxf(*es_node_value(scratch, 1, ES_NODE_RADIUS), 0.0f));
     for (uint32_t level = size; level; level /= 2) store(r, tree, &frame, scratch, level, level, level, level == size);
 }
 
@@ -166,7 +161,7 @@ static void refit_block(void* user, uint32_t first, uint32_t last, uint32_t work
 {
     const refitting* r = user;
     es_point_forest* forest = r->forest;
-    const es_node_columns scratch = columns_at(&forest->own->scratch, ES_TREE_SCRATCH * (size_t)worker);
+    float* scratch = forest->own->scratch + ES_TREE_SCRATCH * (size_t)worker;
     for (uint32_t i = first; i < last; i++) {
         es_tree_task* task = &forest->own->tasks[i];
         const es_point_tree* tree = &forest->trees[task->tree];
@@ -181,7 +176,7 @@ static void refit_block(void* user, uint32_t first, uint32_t last, uint32_t work
             job.z = forest->z + tree->first_leaf;
             job.normal = forest->normal + tree->first_leaf;
         }
-        if (work & ES_TREE_NODES) make_block(r, task, tree, &job, &scratch);
+        if (work & ES_TREE_NODES) make_block(r, task, tree, &job, scratch);
         else if (job.x) r->kernels->forest_leaves(&job, task->block * size, (task->block + 1) * size);
         if (r->rest || state->plain || !(work & ES_TREE_LOOKS)) continue;
         const es_node_looks looks = looks_of(forest, tree);
@@ -207,21 +202,21 @@ static void refit_upper(void* user, uint32_t first, uint32_t last, uint32_t work
             for (uint32_t level = blocks / 2; level; level /= 2) r->kernels->forest_blend(&looks, level, 2 * level);
         }
         if (!(state->work & ES_TREE_NODES) || (r->again && !state->again)) continue;
-        const es_node_columns upper = columns_at(&forest->own->upper, state->upper);
+        float* upper = es_node_value(forest->own->upper, state->upper, 0);
         float* area = forest->area + tree->first;
         double total = 0.0;
         for (uint32_t level = blocks / 2; level; level /= 2) {
             float sum;
-            r->kernels->forest_merge(&upper, level, false, area + 2 * (size_t)level, area + level, &sum);
+            r->kernels->forest_merge(upper, level, false, area + 2 * (size_t)level, area + level, &sum);
             total += (double)sum;
         }
         state->measure = total;
         if (r->rest) continue;
-        const float radius = es_maxf(upper.of[ES_NODE_RADIUS][1], 0.0f), guess = ES_TREE_REACH * diagonal(state);
+        const float radius = es_maxf(*es_node_value(upper, 1, ES_NODE_RADIUS), 0.0f), guess = ES_TREE_REACH * diagonal(state);
         state->again = blocks > 1 && radius > guess && !r->again;
         const es_node_frame frame = frame_of(state->low, state->high, blocks == 1 || r->again ? radius : guess);
         keep_frame(tree, &frame);
-        for (uint32_t level = blocks / 2; level; level /= 2) store(r, tree, &frame, &upper, level, level, level, false);
+        for (uint32_t level = blocks / 2; level; level /= 2) store(r, tree, &frame, upper, level, level, level, false);
     }
 }
 
@@ -289,14 +284,14 @@ typedef struct standing { const es_gi_kernels* kernels; const es_point_forest* f
 static void stand_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const standing* s = user;
-    const es_node_columns scratch = columns_at(&s->forest->own->scratch, ES_TREE_SCRATCH * (size_t)worker);
+    float* scratch = s->forest->own->scratch + ES_TREE_SCRATCH * (size_t)worker;
     es_leaf_job job = leaves_of(s->forest, s->tree);
-    job.columns = scratch;
+    job.nodes = scratch;
     /* `begin` is that of a block */
     read_vertices(s->kernels, s->forest, &s->tasks[begin / ES_TREE_BLOCK], false, worker, &job);
     s->kernels->forest_leaves(&job, begin, end);
     for (uint32_t i = begin; i < end; i++) {
-        for (int k = 0; k < 3; k++) s->points[i].position[k] = scratch.of[k][i - begin];
+        for (int k = 0; k < 3; k++) s->points[i].position[k] = *es_node_value(scratch, i - begin, k);
         s->points[i].index = i;
     }
 }
@@ -323,12 +318,12 @@ static void fill_slots(es_split_point* trees, uint32_t count, uint32_t* slots, u
 }
 
 /* A tree's root in the world. */
-static void root_of(const es_point_forest* forest, uint32_t index, float out[ES_NODE_COLUMNS])
+static void root_of(const es_point_forest* forest, uint32_t index, float out[ES_NODE_VALUES])
 {
     const es_point_tree* tree = &forest->trees[index];
     const float* m = tree->rotation;
-    float root[ES_NODE_COLUMNS], reach = 0.0f;
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) root[k] = forest->own->upper.of[k][forest->own->states[index].upper + 1];
+    float root[ES_NODE_VALUES], reach = 0.0f;
+    for (int k = 0; k < ES_NODE_VALUES; k++) root[k] = *es_node_value(forest->own->upper, forest->own->states[index].upper + 1, k);
     for (int k = 0; k < 3; k++) {
         out[ES_NODE_X + k] = m[k] * root[ES_NODE_X] + m[3 + k] * root[ES_NODE_Y] + m[6 + k] * root[ES_NODE_Z] + tree->translation[k];
         out[ES_NODE_AXIS_X + k] = m[k] * root[ES_NODE_AXIS_X] + m[3 + k] * root[ES_NODE_AXIS_Y] + m[6 + k] * root[ES_NODE_AXIS_Z];
@@ -341,14 +336,14 @@ static void root_of(const es_point_forest* forest, uint32_t index, float out[ES_
     out[ES_NODE_SLAB] = es_minf(root[ES_NODE_SLAB] + reach * 5e-7f, es_maxf(out[ES_NODE_RADIUS], 0.0f));
 }
 
-static void top_leaf(const es_point_forest* forest, const es_node_columns* columns, uint32_t slot)
+static void top_leaf(const es_point_forest* forest, float* nodes, uint32_t slot)
 {
     const es_point_tree* top = &forest->top;
     const uint32_t node = top->leaf_count + slot, index = forest->top_trees[slot];
-    float values[ES_NODE_COLUMNS] = {[ES_NODE_RADIUS] = -1.0f, [ES_NODE_AXIS_Y] = 1.0f, [ES_NODE_COSINE] = 1.0f};
+    float values[ES_NODE_VALUES] = {[ES_NODE_RADIUS] = -1.0f, [ES_NODE_AXIS_Y] = 1.0f, [ES_NODE_COSINE] = 1.0f};
     const size_t root = index == UINT32_MAX ? 0 : forest->trees[index].first + 1;
     if (index != UINT32_MAX) root_of(forest, index, values);
-    for (int k = 0; k < ES_NODE_COLUMNS; k++) columns->of[k][node] = values[k];
+    for (int k = 0; k < ES_NODE_VALUES; k++) *es_node_value(nodes, node, k) = values[k];
     forest->area[top->first + node] = root ? forest->area[root] : 0.0f;
     forest->albedo[top->first + node] = root ? forest->albedo[root] : 0;
     forest->emission[top->first + node] = root ? forest->emission[root] : 0;
@@ -360,10 +355,10 @@ void es_forest_refit_top(es_context* context, es_point_forest* forest, es_split_
     es_point_tree* top = &forest->top;
     forest->radius = 0.0f;
     if (!top->leaf_count) return;
-    const es_node_columns columns = columns_at(&forest->own->upper, forest->own->upper_count - 2 * (size_t)top->leaf_count);
+    float* nodes = es_node_value(forest->own->upper, forest->own->top_upper, 0);
     float low[3], high[3];
     for (uint32_t i = 0; i < forest->tree_count; i++) {
-        float root[ES_NODE_COLUMNS];
+        float root[ES_NODE_VALUES];
         root_of(forest, i, root);
         order[i].index = i;
         for (int k = 0; k < 3; k++) {
@@ -374,18 +369,18 @@ void es_forest_refit_top(es_context* context, es_point_forest* forest, es_split_
     }
     es_tree_split_any(order, forest->tree_count);
     fill_slots(order, forest->tree_count, forest->top_trees, top->leaf_count);
-    for (uint32_t i = 0; i < top->leaf_count; i++) top_leaf(forest, &columns, i);
+    for (uint32_t i = 0; i < top->leaf_count; i++) top_leaf(forest, nodes, i);
     const es_node_looks looks = looks_of(forest, top);
     float* area = forest->area + top->first;
     for (uint32_t level = top->leaf_count / 2; level; level /= 2) {
         float sum;
-        r.kernels->forest_merge(&columns, level, false, area + 2 * (size_t)level, area + level, &sum);
+        r.kernels->forest_merge(nodes, level, false, area + 2 * (size_t)level, area + level, &sum);
         r.kernels->forest_blend(&looks, level, 2 * level);
     }
-    forest->radius = es_maxf(columns.of[ES_NODE_RADIUS][1], 0.0f);
+    forest->radius = es_maxf(*es_node_value(nodes, 1, ES_NODE_RADIUS), 0.0f);
     const es_node_frame frame = frame_of(low, high, forest->radius);
     keep_frame(top, &frame);
-    store(&r, top, &frame, &columns, 1, 1, 2 * top->leaf_count - 1, false);
+    for (uint32_t level = 1; level <= top->leaf_count; level *= 2) store(&r, top, &frame, nodes, level, level, level, false);
 }
 
 /* ---- light ------------------------------------------------------------------------------------------------------------------------ */
