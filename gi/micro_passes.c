@@ -54,7 +54,7 @@ void es_micro_free(es_context* context, es_micro_buffers* micro)
 
 es_micro_settings es_micro_settings_of(const es_renderer_settings* s)
 {
-    return (es_micro_settings){.size = s->micro_size, .cut = s->micro_cut, .cover = s->micro_cover, .ray_cast = s->micro_ray_cast, .warp = s->micro_warp, .quantised = s->micro_nodes == ES_MICRO_QUANTISED};
+    return (es_micro_settings){.size = s->micro_size, .cut = s->micro_cut, .cover = s->micro_cover, .share = s->micro_share, .ray_cast = s->micro_ray_cast, .warp = s->micro_warp, .quantised = s->micro_nodes == ES_MICRO_QUANTISED};
 }
 
 static es_result bring_forest(es_renderer* r, const es_frame_inputs* in)
@@ -135,7 +135,7 @@ static es_result pass_point_light(es_renderer* r, const es_frame_inputs* in)
         for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
         uint32_t words[] = {bounces, s->micro_light, s->micro_level, s->micro_photons, s->seed, s->micro_size, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->vpl_count};
         es_plan_reads(plan, words, sizeof words);
-        float of_light[] = {s->ism_bias, s->ism_slope_bias, s->spread, s->lobe_roughness, s->geometry_bound, in->extent, s->micro_cut, s->micro_cover};
+        float of_light[] = {s->ism_bias, s->ism_slope_bias, s->spread, s->lobe_roughness, s->geometry_bound, in->extent, s->micro_cut, s->micro_cover, s->micro_share};
         es_plan_reads(plan, of_light, sizeof of_light);
     }
     if (!es_plan_run(plan, ES_PASS_POINT_LIGHT)) return ES_OK;
@@ -309,7 +309,7 @@ es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
     const uint32_t words[] = {s->micro_size, s->micro_spacing, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->has_specular, s->seed, r->micro.turn, several};
     es_plan_reads(plan, words, sizeof words);
-    const float numbers[] = {s->micro_cut, s->micro_cover};
+    const float numbers[] = {s->micro_cut, s->micro_cover, s->micro_share};
     es_plan_reads(plan, numbers, sizeof numbers);
     bool gathered_now = es_plan_run(plan, ES_PASS_MICRO);
     if (gathered_now) {

@@ -13,23 +13,13 @@
 #include "gi/kernel_table.h"
 #include "gi/kernels/micro_cut_simd.h"
 #include "gi/kernels/micro_map_simd.h"
+#include "gi/kernels/micro_panorama_simd.h"
 #include "gi/kernels/node_lobe_simd.h"
 #include "gi/kernels/surface_simd.h"
 #include "raster/pack.h"
 
-/* Squared distances, as shares of the extent's square, within [2^-57, 2^6). */
-#define DEPTH_BASE ((127 + 6 - 63) << 10)
-#define NEAREST 7e-18f
-#define FARTHEST 63.0f
-#define EMPTY INT32_MAX
 /* Radii within which a disc is taken for the surface that it lies on, when it faces the same way. */
 #define OWN_SURFACE 2.0f
-
-VINL vi depth_of(vf square, float inverse_square)
-{
-    const vf share = vf_min(vf_max(square * vf_set1(inverse_square), vf_set1(NEAREST)), vf_set1(FARTHEST));
-    return (vi_shift_right_logical(vi_from_bits(share), 13) - vi_set1(DEPTH_BASE + 32768)) << 16;
-}
 
 static int32_t* pixels_of(es_micro_scratch* s, uint32_t lane) { return s->words[lane] + ES_MICRO_MARGIN; }
 
@@ -356,11 +346,38 @@ static unwarped unwarped_of(const es_gather_point* point, const lanes* l, uint32
     return lobe;
 }
 
-static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count, es_micro_mapping mapping, float open, es_micro_scratch* s)
+static void look_up(const es_micro_job* job, es_micro_scratch* s, const common* common, const lanes* here, uint32_t lane, const es_micro_rays* rays)
+{
+    const bool lobe = here->mapping != ES_MICRO_COSINE;
+    if (lobe) lobe_rays(job->table, here, lane, s);
+    for (; common; common = common->outer) {
+        if (common->end == common->first) continue;
+        onlooker o;
+        for (int i = 0; i < 3; i++) {
+            const float* axis = common->axes[i];
+            o.offset[i] = o.turn[i][0] = o.turn[i][1] = o.turn[i][2] = 0.0f;
+            for (int k = 0; k < 3; k++) {
+                o.offset[i] += axis[k] * (here->p[k][lane] - common->middle[k]);
+                o.turn[i][0] += axis[k] * here->t[k][lane];
+                o.turn[i][1] += axis[k] * here->b[k][lane];
+                o.turn[i][2] += axis[k] * here->a[k][lane];
+            }
+        }
+        const float* const towards[3] = {lobe ? s->rays[0] : rays->x, lobe ? s->rays[1] : rays->y, lobe ? s->rays[2] : rays->z};
+        if (common->layout.zoomed) look_at_far(job, &s->panoramas[common->level], &common->layout, &o, towards, pixels_of(s, lane));
+        else {
+            layout plain = common->layout;
+            plain.zoomed = false;
+            look_at_far(job, &s->panoramas[common->level], &plain, &o, towards, pixels_of(s, lane));
+        }
+    }
+}
+
+static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count, es_micro_mapping mapping, float open, const common* common, es_micro_scratch* s)
 {
     const es_micro_table* table = job->table;
     const uint32_t words = table->stride * table->size + 2 * ES_MICRO_MARGIN;
-    for (uint32_t i = 0; i < VW; i++)
+    for (uint32_t i = 0; i < count; i++)
         for (uint32_t k = 0; k < words; k += VW) vi_store(s->words[i] + k, vi_set1(EMPTY));
     lanes here = lanes_of(job, first, count, mapping);
     uint32_t jitters[VW];
@@ -368,15 +385,17 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
         jitters[i] = es_micro_jitter(&job->points[job->order[first + (i < count ? i : 0)]]);
         for (int k = 0; k < 2; k++) here.shift[k][i] = table->rays[jitters[i]].shift[k];
     }
+    const uint32_t begin = common ? common->end : 0;
     if (mapping != ES_MICRO_COSINE) tabulate_lobe(table, &here, s);
-    draw_small(job, s, &here, 0, s->cut.count, vm_all_lanes());
-    draw_near(job, s, &here, jitters, open, count < VW ? (1u << count) - 1 : 0xffu);
+    if (s->cut.count > begin) draw_small(job, s, &here, begin, s->cut.count, vm_first((int32_t)count));
+    if (s->cut.near < ES_MICRO_MAX_CUT) draw_near(job, s, &here, jitters, open, (1u << count) - 1);
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t index = job->order[first + i];
         const es_gather_point* point = &job->points[index];
         const unwarped lobe = mapping == ES_MICRO_COSINE ? unwarped_of(point, &here, i) : (unwarped){.is = false};
         const float f90 = point->kind == ES_GATHER_LOBE ? 0.0f : here.f90[i], nv = es_micro_view_cosine(point), b = 1.0f - nv, b2 = b * b, share = 1.0f / (float)(table->size * table->size);
         float sums[3];
+        if (common) look_up(job, s, common, &here, i, &table->rays[jitters[i]]);
         sum_up(job, s, &table->rays[jitters[i]], &here, i, f90, &lobe, sums);
         for (int k = 0; k < 3; k++) job->result[k][index] = sums[k] * share * (mapping != ES_MICRO_COSINE ? here.total[k][i] : 3.14159265f * (1.0f - f90 * (0.04f + 0.96f * (b2 * b2 * b))));
     }
@@ -384,23 +403,104 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
     s->stats.samples += (uint64_t)count * table->size * table->size;
 }
 
-void ES_KERNEL(es_gi_micro_gather)(const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* s)
+/* Half the range of a lobe's zoom that all texels of a panorama would be needed for. */
+static float zoom_of(const es_micro_job* job, uint32_t first, uint32_t count, float* least)
 {
-    const es_micro_mapping mapping = es_micro_mapping_of(&job->points[job->order[first]], &job->settings);
-    const cell world = bound(job, first, count, mapping);
-    float open = job->settings.cut / (float)(job->table->size * job->table->size);
-    while (!find_cut(job, &world, open, count > VW, s)) {
-        if (count > 1) {
-            const uint32_t half = count > VW ? (count / 2 + VW - 1) / VW * VW : count / 2;
-            ES_KERNEL(es_gi_micro_gather)(job, first, half, s);
-            ES_KERNEL(es_gi_micro_gather)(job, first + half, count - half, s);
-            return;
-        }
-        open *= 4.0f;
+    float most = 1.0f;
+    *least = 3e38f;
+    for (uint32_t i = 0; i < count; i++) {
+        const es_gather_point* point = &job->points[job->order[first + i]];
+        const float sharpness = es_micro_sharpness(point), nv = es_micro_view_cosine(point);
+        /* pi times the density at its largest (lane_bound), as texels are wanted per steradian: size² k² / 4 of them, size² density pixels */
+        const float bound = point->model == ES_SURFACE_PHONG ? 0.5f * (sharpness + 1.0f) : 0.5f / ((nv + es_sqrt(sharpness + (1.0f - sharpness) * nv * nv)) * sharpness);
+        const float zoom = es_maxf(es_sqrt(bound * (4.0f / 3.14159265f)), 1.0f);
+        most = es_maxf(most, zoom);
+        *least = es_minf(*least, zoom);
     }
+    return most;
+}
+
+/* False: the points look too different ways for one panorama. */
+static bool lay_out(const es_micro_job* job, uint32_t first, uint32_t count, const cell* world, es_micro_mapping mapping, common* c)
+{
+    const float size = (float)(job->table->size * (count > 4 ? 5 : 3) / 2), back = 0.5f * size, half = 0.5f * size;
+    const bool lobes = mapping != ES_MICRO_COSINE;
+    layout* l = &c->layout;
+    *l = (layout){.zoom = 1.0f, .zoomed = lobes || world->sine > 0.5f, .size = {size, back}, .scale = {half, 0.5f * back}, .column = {half + 1.0f, size + 3.0f + 0.5f * back}, .row = {half + 1.0f, 0.5f * back + 1.0f},
+        .left = {0.0f, size + 2.0f}};
+    if (!l->zoomed) l->scale[0] = half * (1.0f - 0.5f * world->sine) / es_sqrt(1.0f - world->sine * world->sine); /* down to the lowest horizon */
+    else if (!lobes) l->zoom = 0.5f; /* what is in front: to 127 degrees */
+    if (lobes) {
+        float least;
+        const float zoom = zoom_of(job, first, count, &least), cosine = world->mirror_cosine;
+        if (cosine < -1.0f) return false;
+        /* with k = 1 / tan(β / 2) the density at the border of the mirror directions' cone is highest */
+        const float k = es_minf(zoom, es_sqrt((1.0f + cosine) / es_maxf(1.0f - cosine, 1e-6f)));
+        if (2.0f * k / ((1.0f + cosine) + k * k * (1.0f - cosine)) < 0.6f * zoom && count > 1) return false;
+        l->zoom = k;
+    }
+    const float* axis = lobes ? world->mirror : world->axis;
+    es_vec3 t, b;
+    es_orthonormal_basis(es_v3(axis[0], axis[1], axis[2]), &t, &b);
+    const float axes[3][3] = {{t.x, t.y, t.z}, {b.x, b.y, b.z}, {axis[0], axis[1], axis[2]}};
+    memcpy(c->axes, axes, sizeof axes);
+    memcpy(c->middle, world->c, sizeof c->middle);
+    return true;
+}
+
+/* Nodes that points draw for themselves: more are cheaper drawn by a smaller cell. */
+enum { FEW_NODES = 300, FEW_LEAVES = 300, MANY_ROOTS = 200 };
+
+/* Is what `outer` left little enough to be drawn by each point? Then it is in the cut. */
+static bool is_little(const es_micro_job* job, const cell* world, float open, uint32_t count, const common* outer, es_micro_scratch* s)
+{
+    s->cut.count = outer->end;
+    s->cut.near = ES_MICRO_MAX_CUT;
+    const uint32_t roots = outer->roots.end - outer->roots.begin;
+    if (roots == 0) return true;
+    return count <= 16 && roots < MANY_ROOTS && find_cut(job, world, open, FEW_NODES, FEW_LEAVES, &outer->roots, outer->end, s);
+}
+
+static bool is_compact(const es_micro_job* job, uint32_t first, uint32_t count, const cell* world, es_micro_mapping mapping)
+{
+    if (count <= 4) return true;
+    const cell left = bound(job, first, count / 2, mapping), right = bound(job, first + count / 2, count - count / 2, mapping);
+    return left.r + right.r > 0.9f * world->r;
+}
+
+static void gather_cell(const es_micro_job* job, uint32_t first, uint32_t count, es_micro_mapping mapping, const common* outer, uint32_t level, es_micro_scratch* s)
+{
+    float open = job->settings.cut / (float)(job->table->size * job->table->size);
+    const bool shares = job->settings.share > 0.0f;
+    const cell world = bound(job, first, count, mapping);
+    common own = {.outer = outer, .level = level};
+    bool direct = outer && is_little(job, &world, open, count, outer, s);
+    if (!direct && shares && level < ES_MICRO_LEVELS && is_compact(job, first, count, &world, mapping) && lay_out(job, first, count, &world, mapping, &own)) {
+        const float texel = 2.0f / own.layout.scale[0];
+        if (draw_panorama(job, &world, &own, texel * texel, s)) {
+            outer = &own;
+            s->stats.drawn += own.end - own.first;
+            direct = is_little(job, &world, open, count, outer, s);
+        }
+    }
+    if (!direct && !outer && count <= 16) direct = find_cut(job, &world, open, shares ? FEW_NODES : 12000, 1500, NULL, 0, s);
+    if (!direct && count > 1) {
+        const uint32_t part = count > 16 ? 16 : count > 4 && shares ? 4 : count > 8 ? 8 : 1;
+        for (uint32_t i = 0; i < count; i += part) gather_cell(job, first + i, count - i < part ? count - i : part, mapping, outer, level + (outer == &own), s);
+        return;
+    }
+    const uint32_t from = outer ? outer->end : 0;
+    if (!direct)
+        while (!find_cut(job, &world, open, ES_MICRO_MAX_CUT, ES_MICRO_MAX_CUT, outer ? &outer->roots : NULL, from, s)) open *= 4.0f;
     s->cut.radiance[EMPTY & 0xffff] = 0;
     s->cut.node[EMPTY & 0xffff] = 0; /* where nothing is, which has no lobe */
     s->cut.nodes[EMPTY & 0xffff] = (es_micro_node){{0}};
-    s->stats.drawn += (uint64_t)(s->cut.count + ES_MICRO_MAX_CUT - s->cut.near) * count;
-    for (uint32_t i = 0; i < count; i += VW) gather_eight(job, first + i, count - i < VW ? count - i : VW, mapping, open, s);
+    s->stats.drawn += (uint64_t)(s->cut.count - from + ES_MICRO_MAX_CUT - s->cut.near) * count;
+    for (uint32_t i = 0; i < count; i += VW) gather_eight(job, first + i, count - i < VW ? count - i : VW, mapping, open, outer, s);
+}
+
+void ES_KERNEL(es_gi_micro_gather)(const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* s)
+{
+    const es_micro_mapping mapping = es_micro_mapping_of(&job->points[job->order[first]], &job->settings);
+    gather_cell(job, first, count, mapping, NULL, 0, s);
 }

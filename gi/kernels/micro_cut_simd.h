@@ -84,7 +84,7 @@ VINL vf lobe_bound(const cell* cell, vf cosine, vf sphere_sine)
 }
 
 /* Which of eight nodes some point of the cell may see, and which of these it opens. */
-VINL vm classify(const cell* cell, const nodes_v* v, float open, vm* opened)
+VINL vm classify(const cell* cell, const nodes_v* v, float open, vm* opened, vf* excess)
 {
     const vf zero = vf_zero(), one = vf_set1(1.0f), r = vf_set1(cell->r);
     const vf dx = v->c[0] - vf_set1(cell->c[0]), dy = v->c[1] - vf_set1(cell->c[1]), dz = v->c[2] - vf_set1(cell->c[2]);
@@ -107,7 +107,24 @@ VINL vm classify(const cell* cell, const nodes_v* v, float open, vm* opened)
             measure = measure * lobe_bound(cell, (vf_set1(cell->mirror[0]) * dx + vf_set1(cell->mirror[1]) * dy + vf_set1(cell->mirror[2]) * dz) * inverse, vf_min(sine, one));
     }
     *opened = inside | vm_gt(measure, vf_set1(open) * square);
+    *excess = vf_select(inside, vf_set1(2.0f), measure / vf_max(vf_set1(open) * square, vf_set1(1e-18f)));
     return above & vm_gt(facing, zero) & vm_gt(v->r, zero);
+}
+
+/* A node's square halves from level to level: how many levels down it is what is allowed, 1 to 3. Looking at the levels between would take longer than what they
+ * leave out. */
+VINL vi levels_down(vf square, vf most)
+{
+    const vi exponents = vi_shift_right_logical(vi_from_bits(square), 23) - vi_shift_right_logical(vi_from_bits(most), 23);
+    return vi_min(vi_max(exponents + vi_set1(1), vi_set1(1)), vi_set1(3));
+}
+
+/* Writes 8 words; how many of them are wanted. */
+VINL uint32_t descend(uint32_t node, int32_t levels, uint32_t leaf_count, uint32_t* to)
+{
+    while (levels > 1 && node << levels >= 2 * leaf_count) levels--;
+    vi_store(to, vi_set1((int32_t)(node << levels)) + vi_iota());
+    return 1u << levels;
 }
 
 typedef struct finder {
@@ -153,45 +170,44 @@ VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, 
     }
 }
 
-/* `trees`: NULL, or where the opened leaves of the tree of trees go. */
-VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uint32_t* trees, uint32_t* tree_count)
+/* From `count` nodes in wave[0] on. `trees`: NULL, or where the opened leaves of the tree of trees go. */
+VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uint32_t count, uint32_t* trees, uint32_t* tree_count)
 {
     const es_point_forest* forest = f->job->forest;
     const es_point_node* packed = forest->nodes + tree->first;
     const es_point_node_float* floats = quantised ? NULL : forest->float_nodes + tree->first;
-    uint32_t *wave = f->s->wave[0], *next = f->s->wave[1], count = 1;
-    wave[0] = 1;
+    uint32_t *wave = f->s->wave[0], *next = f->s->wave[1];
     while (count && !f->full) {
         uint32_t opened_count = 0;
         for (uint32_t i = count; i < (count + 7) / 8 * 8; i++) wave[i] = 1;
-        const bool leaves = wave[0] >= tree->leaf_count; /* all of a level are of one kind */
         for (uint32_t i = 0; i < count; i += VW) {
             const vi at = vi_load(wave + i);
             const nodes_v v = quantised ? load_quantised(tree, packed, at) : load_float(floats, packed, at);
             vm opened;
-            const vm seen = classify(&f->here, &v, f->open, &opened) & vm_first((int32_t)(count - i));
-            const uint32_t kept = vm_bits(seen & ~opened);
-            uint32_t down = vm_bits(seen & opened);
+            vf excess;
+            const vm seen = classify(&f->here, &v, f->open, &opened, &excess) & vm_first((int32_t)(count - i));
+            const uint32_t kept = vm_bits(seen & ~opened), leaves = ~vm_bits(vi_gt(vi_set1((int32_t)tree->leaf_count), at));
+            const uint32_t open = vm_bits(seen & opened);
             if (kept) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), kept, false);
-            if (!leaves) {
-                if (opened_count + 2 * VW > 2 * ES_MICRO_MAX_CUT - VW) {
-                    f->full = true;
-                    break;
-                }
-                for (; down; down &= down - 1) {
-                    const uint32_t node = wave[i + (uint32_t)__builtin_ctz(down)];
-                    next[opened_count++] = 2 * node;
-                    next[opened_count++] = 2 * node + 1;
-                    if (quantised) __builtin_prefetch(packed + 2 * (size_t)node);
-                    else __builtin_prefetch(floats + 2 * (size_t)node);
-                }
-            } else if (trees) {
-                for (; down; down &= down - 1) {
-                    const uint32_t index = forest->top_trees[wave[i + (uint32_t)__builtin_ctz(down)] - tree->leaf_count];
-                    if (index != UINT32_MAX) trees[(*tree_count)++] = index;
-                }
-            } else if (down) {
-                keep(f, tree, &v, at + vi_set1((int32_t)tree->first), down, true);
+            uint32_t down = open & ~leaves, left = open & leaves;
+            int32_t levels[VW];
+            vi_store(levels, levels_down(excess, vf_set1(1.0f)));
+            if (opened_count + 8 * VW > 2 * ES_MICRO_MAX_CUT - VW) {
+                f->full = true;
+                break;
+            }
+            for (; down; down &= down - 1) {
+                const uint32_t k = (uint32_t)__builtin_ctz(down);
+                opened_count += descend(wave[i + k], levels[k], tree->leaf_count, next + opened_count);
+                const size_t below = next[opened_count - 1];
+                if (quantised) __builtin_prefetch(packed + below), __builtin_prefetch(packed + below - (1u << levels[k]) + 1);
+                else __builtin_prefetch(floats + below);
+            }
+            if (!left) continue;
+            if (!trees) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), left, true);
+            for (; trees && left; left &= left - 1) {
+                const uint32_t index = forest->top_trees[wave[i + (uint32_t)__builtin_ctz(left)] - tree->leaf_count];
+                if (index != UINT32_MAX) trees[(*tree_count)++] = index;
             }
         }
         uint32_t* swapped = wave;
@@ -264,24 +280,38 @@ static cell turned(const es_point_tree* tree, const cell* world)
     return here;
 }
 
-/* Points whose common cut has more nodes are too far from each other to share it. */
-enum { LARGE_CUT = 12000, LARGE_NEAR = 1500 };
+/* Nodes to begin with: a run of the scratch's roots; NULL: all there is. */
+typedef struct beginnings { uint32_t begin, end; } beginnings;
 
-/* False: there is no room for it, or it is too large for the cell to be worth while (`divisible`). */
-static bool find_cut(const es_micro_job* job, const cell* world, float open, bool divisible, es_micro_scratch* s)
+/* The next tree of a run and its roots, to the first wave. */
+static uint32_t roots_of_tree(es_micro_scratch* s, const beginnings* roots, uint32_t* at, uint32_t* tree)
+{
+    uint32_t count = 0;
+    *tree = s->roots[*at].tree;
+    for (; *at < roots->end && s->roots[*at].tree == *tree; (*at)++) s->wave[0][count++] = s->roots[*at].node;
+    return count;
+}
+
+/* Behind the `first` nodes that the cut holds. False: there are more than `most` beyond these, or most_near. */
+static bool find_cut(const es_micro_job* job, const cell* world, float open, uint32_t most, uint32_t most_near, const beginnings* roots, uint32_t first, es_micro_scratch* s)
 {
     const es_point_forest* forest = job->forest;
-    finder f = {.job = job, .s = s, .here = *world, .open = open, .most = divisible ? LARGE_CUT : ES_MICRO_MAX_CUT, .most_near = divisible ? LARGE_NEAR : ES_MICRO_MAX_CUT};
+    const bool quantised = job->settings.quantised;
+    finder f = {.job = job, .s = s, .here = *world, .open = open, .most = first + most, .most_near = most_near};
     uint32_t trees = 0;
-    s->cut.count = 0;
+    s->cut.count = first;
     s->cut.near = ES_MICRO_MAX_CUT;
-    if (job->settings.quantised) find_in_tree(&f, &forest->top, true, s->trees, &trees);
-    else find_in_tree(&f, &forest->top, false, s->trees, &trees);
-    for (uint32_t i = 0; i < trees && !f.full; i++) {
-        const es_point_tree* tree = &forest->trees[s->trees[i]];
+    s->wave[0][0] = 1;
+    if (!roots && quantised) find_in_tree(&f, &forest->top, true, 1, s->trees, &trees);
+    else if (!roots) find_in_tree(&f, &forest->top, false, 1, s->trees, &trees);
+    for (uint32_t i = roots ? roots->begin : 0; i < (roots ? roots->end : trees) && !f.full;) {
+        uint32_t index, count = 1;
+        if (roots) count = roots_of_tree(s, roots, &i, &index);
+        else index = s->trees[i++], s->wave[0][0] = 1;
+        const es_point_tree* tree = &forest->trees[index];
         f.here = turned(tree, world);
-        if (job->settings.quantised) find_in_tree(&f, tree, true, NULL, NULL);
-        else find_in_tree(&f, tree, false, NULL, NULL);
+        if (quantised) find_in_tree(&f, tree, true, count, NULL, NULL);
+        else find_in_tree(&f, tree, false, count, NULL, NULL);
     }
     return !f.full;
 }

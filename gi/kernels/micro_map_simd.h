@@ -218,11 +218,12 @@ VINL vi lobe_pixel(const es_micro_table* table, const lanes* l, const es_micro_s
     return pixel_at(table, vf_min(across * two - one, one), vf_min(along * two - one, one));
 }
 
-/* The place in [-1, 1] of a running sum's share. */
-static float table_place(const float* sums, float share)
+/* The place in [-1, 1] of a running sum's share; *cell is where it is, or before. */
+VINL float table_place(const float* sums, float share, uint32_t* cell)
 {
-    uint32_t i = 0;
+    uint32_t i = *cell;
     while (i + 1 < ES_MICRO_GRID && sums[(i + 1) * VW] <= share) i++;
+    *cell = i;
     const float low = sums[i * VW], high = sums[(i + 1) * VW];
     return ((float)i + (high > low ? es_clampf((share - low) / (high - low), 0.0f, 1.0f) : 0.5f)) * (2.0f / ES_MICRO_GRID) - 1.0f;
 }
@@ -241,12 +242,13 @@ static void lobe_rays(const es_micro_table* table, const lanes* l, uint32_t lane
     const lanes alone = lane_alone(l, lane);
     const uint32_t size = table->size;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
-    for (uint32_t column = 0; column < size; column++) {
-        const float u = table_place(&s->marginal[0][lane], ((float)column + 0.5f + l->shift[0][lane]) / (float)size);
+    const float share = 1.0f / (float)size;
+    for (uint32_t column = 0, across = 0; column < size; column++) {
+        const float u = table_place(&s->marginal[0][lane], ((float)column + 0.5f + l->shift[0][lane]) * share, &across);
         const uint32_t cell = (uint32_t)es_clampf((u + 1.0f) * (0.5f * ES_MICRO_GRID), 0.0f, ES_MICRO_GRID - 1);
-        for (uint32_t row = 0; row < size; row++) {
+        for (uint32_t row = 0, along = 0; row < size; row++) {
             s->rays[0][row * table->stride + column] = u;
-            s->rays[1][row * table->stride + column] = table_place(&s->conditional[cell][0][lane], ((float)row + 0.5f + l->shift[1][lane]) / (float)size);
+            s->rays[1][row * table->stride + column] = table_place(&s->conditional[cell][0][lane], ((float)row + 0.5f + l->shift[1][lane]) * share, &along);
         }
         for (uint32_t pad = size; column + 1 == size && pad < table->stride; pad++)
             for (uint32_t row = 0; row < size; row++) s->rays[0][row * table->stride + pad] = u, s->rays[1][row * table->stride + pad] = s->rays[1][row * table->stride + column];

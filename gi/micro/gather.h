@@ -8,7 +8,13 @@
 
 enum {
     ES_MICRO_LANES = 8,
-    ES_MICRO_CELL = 16,           /* points that share a cut */
+    ES_MICRO_CELL = 64,           /* points that share what is far (kernels/micro_panorama_simd.h) */
+    ES_MICRO_LEVELS = 4,          /* cells of 64, 16, 4 points, and points */
+    ES_MICRO_CHART = 80,          /* texels a side of what is shared, at most */
+    ES_MICRO_PANORAMA = (ES_MICRO_CHART + 2) * (ES_MICRO_CHART * 3 / 2 + 12),
+    ES_MICRO_MAX_FAR = 49152,     /* nodes of what is shared, at most */
+    ES_MICRO_STAGE = 256,
+    ES_MICRO_MAX_ROOTS = 4096,
     ES_MICRO_PIXELS = ES_MICRO_MAX_SIZE * ES_MICRO_MAX_SIZE,
     ES_MICRO_MARGIN = ES_MICRO_MAX_SIZE + 8, /* empty words before and behind a buffer */
     ES_MICRO_LANE = ES_MICRO_PIXELS + 2 * ES_MICRO_MARGIN, /* from one buffer to the next: not a multiple of what would put all into the same sets of a cache */
@@ -92,10 +98,27 @@ typedef struct es_micro_cut {
     uint32_t near;                         /* leaves that some would: [near, ES_MICRO_MAX_CUT) */
 } es_micro_cut;
 
+/* What a cell's points see in common. */
+typedef struct es_micro_panorama {
+    uint32_t rows, stride;                 /* with a border of one texel */
+    int32_t words[ES_MICRO_PANORAMA];
+} es_micro_panorama;
+
+/* While a panorama is drawn. */
+typedef struct es_micro_canvas {
+    float stage[4][ES_MICRO_STAGE + 8];    /* nodes that wait to be drawn: where they are in the cell's axes, the square of the radius that they are drawn with */
+    int32_t words[ES_MICRO_PANORAMA + 2 * (ES_MICRO_CHART * 3 / 2 + 12)]; /* with an empty row before and behind */
+    bool has_rays;
+    float rays[3][ES_MICRO_PANORAMA];      /* through the texels, in the cell's axes; 0 where there is none */
+} es_micro_canvas;
+
 /* A worker's. */
 typedef struct es_micro_scratch {
     int32_t words[ES_MICRO_LANES][ES_MICRO_LANE]; /* depth << 16 | place in the cut (kernels/micro.c); pixels begin after the margin */
     es_micro_cut cut;
+    es_micro_canvas canvas;
+    es_micro_panorama panoramas[ES_MICRO_LEVELS];
+    struct { uint32_t tree, node; } roots[ES_MICRO_LEVELS * ES_MICRO_MAX_ROOTS]; /* subtrees that are near, of each level behind those of the level above, in the order of trees */
     uint32_t wave[2][2 * ES_MICRO_MAX_CUT]; /* nodes of a tree's level that are looked at */
     uint32_t* trees;                       /* that the cell opens; as many as the forest has */
     uint8_t cast[ES_MICRO_MAX_CUT];        /* lanes in which a leaf is met by rays */
