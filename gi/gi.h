@@ -146,7 +146,8 @@ typedef struct es_renderer_settings {
                                       * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
     float micro_cut;                 /* a node is drawn, not opened, when its sphere's solid angle is at most this share of that of a pixel above the surface,
                                       * pi / micro_size²; of a lobe's pixel, there */
-    float micro_share;
+    float micro_share;               /* what is further than so many radii of a cell of up to 64 gather points is drawn once, from the cell's middle, and looked up by each of
+                                      * them: more is slower and nearer to the truth; 0: each point draws all that it sees */
     float micro_cover;               /* it is drawn where a disc of so many times its area covers the ray through the pixel: with 1 things are as wide as they are, but have
                                       * gaps; gaps between nodes are closed. Without effect on what is distributed as a lobe is */
     uint32_t micro_filter;           /* with micro_spacing 1: diffuse light goes through the geometry-aware filter of that size, filter_passes times: its noise is that of

@@ -352,7 +352,7 @@ static void look_up(const es_micro_job* job, es_micro_scratch* s, const common* 
     if (lobe) lobe_rays(job->table, here, lane, s);
     for (; common; common = common->outer) {
         if (common->end == common->first) continue;
-        onlooker o;
+        onlooker o = {.near = common->near};
         for (int i = 0; i < 3; i++) {
             const float* axis = common->axes[i];
             o.offset[i] = o.turn[i][0] = o.turn[i][1] = o.turn[i][2] = 0.0f;

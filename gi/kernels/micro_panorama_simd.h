@@ -1,8 +1,11 @@
-/* What a cell of gather points sees in common: a picture of all that is far from it, drawn from its middle once (the papers' traversal is shared by points of a
- * block as well, Ritschel thesis §6.3.1; here what comes after it is). What is nearer than some of the cell's radii is left to each point.
+/* What a cell of gather points sees in common: a picture of all that is far from it, drawn from its middle once. Points of a block share a traversal in the thesis
+ * as well (Ritschel §6.3.1); here they share what comes after it. What is nearer than some of the cell's radii is left to smaller cells, which are parts of it and
+ * draw pictures of their own of what they were left, and in the end to each point.
  *
- * A point looks along each of its rays into the picture. Where the ray leaves from beside the middle, what is seen along the ray's direction stands as far as the
- * picture says; from there the direction from the middle is better known, and there the point looks again (Szirmay-Kalos et al. 2005: distance impostors).
+ * A point looks along each of its rays into the pictures. It guesses that what it sees is as far as what it saw by the ray beside it; where that is, seen from the
+ * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). Two looks are enough: with a guess
+ * of infinity, three were worse. Where a
+ * look finds nothing, what is left out may be in the way, and the next one is to where that ends; one that found something holds: what is near is nearer in any case.
  *
  * The picture is a map of directions (x, y, z), z along the cell's axis, in one chart or two. First the sphere is turned into itself by the conformal map that
  * multiplies tan(θ/2) by k: of a direction of length ρ
@@ -392,6 +395,7 @@ typedef struct common {
     uint32_t level;
     layout layout;
     float axes[3][3], middle[3];   /* of the layout, world */
+    float near;                    /* metres: what is nearer is left out */
     uint32_t first, end;           /* its nodes in the cut */
     beginnings roots;              /* what is left */
 } common;
@@ -411,6 +415,7 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
     far_finder f = {.job = job, .s = s, .layout = c->layout, .here = *world, .open = open, .near = job->settings.share * world->r, .front = 0.5f / l->zoom, .behind = 0.5f / l->zoom * l->scale[0] / l->scale[1], .rows = p->rows, .stride = p->stride, .root_count = begin, .root_end = begin + ES_MICRO_MAX_ROOTS};
     memcpy(f.axes, c->axes, sizeof f.axes);
     uint32_t trees = 0;
+    c->near = f.near;
     c->first = s->cut.count = c->outer ? c->outer->end : 0;
     for (uint32_t at = 0; at < p->stride * (p->rows + 2); at += VW) vi_store(s->canvas.words + at, vi_set1(EMPTY));
     s->wave[0][0] = 1;
@@ -439,7 +444,7 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
 enum { LOOKS = 2 };
 
 /* A point in the cell's axes, from its middle; columns of `turn` are the point's axes there. */
-typedef struct onlooker { float offset[3], turn[3][3]; } onlooker;
+typedef struct onlooker { float offset[3], turn[3][3], near; } onlooker;
 
 /* In rows of 8 n pixels. A row's eights go side by side: the way from a guess to a texel's word and on is one long chain of latencies. */
 VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, const layout* l, const onlooker* o, const float* const rays[3], uint32_t n, int32_t* pixels)
@@ -449,6 +454,7 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
     const uint32_t size = job->table->size;
     vf t[4], x[4], y[4], z[4], rho[4];
     vi at[4], word[4];
+    vm blind[4];
     for (uint32_t i = 0; i < n; i++) t[i] = extent; /* as far as was seen one row above */
     for (uint32_t row = 0; row < size; row++) {
         for (uint32_t i = 0; i < n; i++) {
@@ -458,6 +464,10 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
             y[i] = vf_set1(o->turn[1][0]) * a + vf_set1(o->turn[1][1]) * b + vf_set1(o->turn[1][2]) * c;
             z[i] = vf_set1(o->turn[2][0]) * a + vf_set1(o->turn[2][1]) * b + vf_set1(o->turn[2][2]) * c;
         }
+        for (uint32_t i = 0; i < n; i++) {
+            word[i] = empty;
+            blind[i] = vi_zero();
+        }
         for (int look = 0; look < LOOKS; look++) {
             for (uint32_t i = 0; i < n; i++) {
                 const vf qx = vf_set1(o->offset[0]) + t[i] * x[i], qy = vf_set1(o->offset[1]) + t[i] * y[i], qz = vf_set1(o->offset[2]) + t[i] * z[i];
@@ -465,12 +475,17 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
                 at[i] = texel_of(l, p->stride, qx, qy, qz, rho[i]);
             }
             for (uint32_t i = 0; i < n; i++) {
-                word[i] = vi_gather(p->words, at[i]);
-                t[i] = vf_max(t[i] + vf_sqrt(share_of(word[i])) * extent - rho[i], zero);
+                const vi found = vi_gather(p->words, at[i]);
+                const vf distance = vf_sqrt(share_of(found)) * extent;
+                const vm there = ~vi_eq(found, empty) & (~blind[i] | vm_lt(distance, vf_set1(2.0f) * rho[i]));
+                blind[i] = ~there;
+                word[i] = vi_select(there, found, word[i]);
+                t[i] = vf_select(there, vf_max(t[i] + distance - rho[i], zero), vf_set1(o->near));
             }
         }
         for (uint32_t i = 0; i < n; i++) {
             int32_t* to = pixels + (row * n + i) * VW;
+            t[i] = vf_select(vi_eq(word[i], empty), extent, t[i]);
             const vm outside = ~vm_first((int32_t)size - (int32_t)(i * VW));
             const vi key = depth_of(t[i] * t[i], job->inverse_square) | (word[i] & vi_set1(0xffff));
             vi_store(to, vi_min(vi_load(to), vi_select(vi_eq(word[i], empty) | outside, empty, key)));

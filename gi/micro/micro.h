@@ -48,8 +48,9 @@ typedef struct es_micro_pixel {
 /* The micro-buffer of one point, settings->size² pixels in rows. */
 es_result es_micro_look(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* point, es_micro_pixel* pixels);
 
-/* result[k][i] of point i. Points are gathered in cells along a space-filling curve, in parallel. Those of a cell share a cut, which is as fine as any of them
- * wants, or coarser where one point alone would draw more than 65528 nodes: what a point gets depends a little on its neighbours, but not on threads or instruction sets. stats may be NULL. */
+/* result[k][i] of point i. Points are gathered in cells along a space-filling curve, in parallel. Those of a cell share what they see far away (settings->share),
+ * and cuts, which are as fine as any of them wants, or coarser where one point alone would draw more than 65528 nodes: what a point gets depends a little on its
+ * neighbours, but not on threads or instruction sets. stats may be NULL. */
 es_result es_micro_gather(es_context* context, const es_point_forest* forest, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* const result[3], es_micro_stats* stats);
 
 #endif
