@@ -53,7 +53,7 @@ static void furnace(room* r, uint32_t points)
     bring(r, points);
 }
 
-static es_micro_settings usual(void) { return (es_micro_settings){.size = 24, .cut = 2, .cover = 2, .ray_cast = true, .warp = true, .quantised = true}; }
+static es_micro_settings usual(void) { return (es_micro_settings){.size = 24, .cut = 4, .cover = 1.3f, .share = 2, .ray_cast = true, .warp = true, .quantised = true}; }
 
 static void gather(const room* r, const es_micro_settings* settings, const es_gather_point* points, size_t count, float* result)
 {
@@ -235,6 +235,51 @@ static void test_awkward_places(void** state)
     leave(&tiny);
 }
 
+/* What is seen from the middle of a cell is nearly what its points see, and the nearer the less of it they share; also beside what is near, and where there is nothing. */
+static void test_shared_view(void** state)
+{
+    (void)state;
+    room r = {.w = small_world_create()};
+    const es_material_desc floor = lambert(0.5f, 1), red = lambert(0.5f, 6), dark = lambert(0, 0);
+    add_rectangle(&r.w, es_v3(-1, -1, 1), es_v3(2, 0, 0), es_v3(0, 0, -2), &floor); /* faces up */
+    add_sphere(&r.w, es_v3(0.2f, -0.7f, 0.1f), 0.29f, 24, false, &red);
+    add_rectangle(&r.w, es_v3(-0.3f, -1, -0.3f), es_v3(0, 0.5f, 0), es_v3(0, 0, 0.6f), &dark);
+    bring(&r, POINTS);
+    enum { SIDE = 24, COUNT = SIDE * SIDE };
+    static es_gather_point points[COUNT];
+    static float own[3 * COUNT], shared[3 * COUNT];
+    es_micro_settings s = usual();
+    for (int lobes_too = 0; lobes_too < 2; lobes_too++) {
+        for (uint32_t i = 0; i < COUNT; i++) {
+            points[i] = floor_point(0.04f * (float)(i % SIDE) - 0.6f, 0.04f * (float)(i / SIDE) - 0.5f, i);
+            if (!lobes_too) continue;
+            points[i].kind = ES_GATHER_LOBE;
+            points[i].model = ES_SURFACE_METALLIC_ROUGHNESS;
+            points[i].roughness = 0.4f;
+            points[i].view[0] = 0.6f, points[i].view[1] = 0.8f;
+            for (int k = 0; k < 3; k++) points[i].f0[k] = 0.8f;
+        }
+        s.share = 0;
+        gather(&r, &s, points, COUNT, own);
+        static const float shares[] = {1, 4, 64};
+        double off[3];
+        for (int k = 0; k < 3; k++) {
+            s.share = shares[k];
+            gather(&r, &s, points, COUNT, shared);
+            double sum = 0;
+            off[k] = 0;
+            for (uint32_t i = 0; i < COUNT; i++) {
+                off[k] += fabs((double)shared[i] - (double)own[i]);
+                sum += (double)own[i];
+            }
+            off[k] /= sum;
+        }
+        print_message("%s: shared beyond 1, 4, 64 radii off by %.4f, %.4f, %.4f\n", lobes_too ? "lobes" : "diffuse", off[0], off[1], off[2]);
+        assert_true(off[0] < 0.24 && off[1] < 0.09 && off[2] < 0.06 && off[1] < off[0]); /* what is left is that texels are not pixels */
+    }
+    leave(&r);
+}
+
 /* The same bits on every instruction set and number of threads. */
 static void test_same_bits(void** state)
 {
@@ -281,6 +326,6 @@ int main(void)
     if (es_context_create(&desc, &context) != ES_OK) return 1;
     es_lobe_albedo_fill(context, &lobes);
     es_context_destroy(context);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_constant_light), cmocka_unit_test(test_disc_overhead), cmocka_unit_test(test_rays_close_holes), cmocka_unit_test(test_awkward_places), cmocka_unit_test(test_same_bits)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_constant_light), cmocka_unit_test(test_disc_overhead), cmocka_unit_test(test_rays_close_holes), cmocka_unit_test(test_awkward_places), cmocka_unit_test(test_shared_view), cmocka_unit_test(test_same_bits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -226,6 +226,7 @@ static void test_interpolation(void** state)
     settings.micro_filter = 1;
     settings.micro_cut = 1; /* the coarser cuts are, the more they differ between cells */
     settings.micro_lobes = false; /* what metal throws on a wall is as small as an edge */
+    settings.micro_share = 0; /* cells of fewer points are wider, and what they share differs (test_micro_gather) */
     stage s = open_stage("cornell", 1, 0, &settings);
     render(&s);
     es_image full = image_of(&s, "irradiance");
