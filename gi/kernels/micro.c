@@ -1,9 +1,11 @@
-/* Micro-rendering (Ritschel thesis §6.2.2): the cut of a cell of gather points (micro_cut_simd.h), then each of them draws it, eight at a time, a lane each.
+/* Micro-rendering (Ritschel thesis §6.2.2) of a cell of gather points: what is far is drawn once, from the cell's middle (micro_panorama_simd.h); what that leaves
+ * goes to parts of the cell, of 16 points, of 4, of one, which do the same; and what is little enough is drawn by each point into pixels of its own, eight points
+ * at a time, a lane each, from a cut that they share (micro_cut_simd.h). Then each looks up its rays in the pictures of its cells: a pixel keeps the nearest.
  *
- * A node whose sphere would cover a pixel more than the cut allows is opened; others are drawn into the pixel that their centre falls on (micro_map_simd.h), or
- * whose ray is nearest, if a disc of their area covers that; where they are the nearest. Of cosine-distributed pixels the measure is the sphere's angle on the disc before foreshortening, (r / d)², against cut / size²:
- * near the horizon pixels are long and narrow, and by their solid angle nodes would be drawn that are wider than the pixel, and leave holes beside it. Of lobes
- * it is that angle times the density.
+ * Of what points draw for themselves, a node whose sphere would cover a pixel more than the cut allows is opened; others are drawn into the pixel whose ray is
+ * nearest, if a disc of their area covers that, or, of lobes, into the pixel of their centre (micro_map_simd.h). Of cosine-distributed pixels the measure is the
+ * sphere's angle on the disc before foreshortening, (r / d)², against cut / size²: near the horizon pixels are long and narrow, and by their solid angle nodes
+ * would be drawn that are wider than the pixel, and leave holes beside it. Of lobes it is that angle times the density.
  *
  * Leaves that are still too large are discs, and met by rays through the pixels that they may cover (on-demand ray casting). Since a pixel keeps the nearest of
  * what comes in any order, they need not wait in a list until the rest is drawn.
@@ -220,6 +222,8 @@ typedef struct unwarped { bool is; es_surface_v surface; vf view[3]; } unwarped;
 /* Adds what nodes of the cut send besides, from their middles to a lane's point. */
 VINL void add_lobes(const es_micro_job* job, const es_micro_cut* cut, const lanes* here, uint32_t lane, vi place, vf light[3])
 {
+    const vi node = vi_gather(cut->node, place);
+    if (vm_all(vi_eq(vi_gather(job->forest->lobes, node * vi_set1(4)), vi_zero()))) return; /* so it is of most */
     vf c[3], rest;
     vf_gather4(cut->nodes, sizeof *cut->nodes, place, &c[0], &c[1], &c[2], &rest);
     vf d[3], square = vf_set1(1e-30f);
@@ -229,7 +233,7 @@ VINL void add_lobes(const es_micro_job* job, const es_micro_cut* cut, const lane
     }
     const vf inverse = vf_set1(1.0f) / vf_sqrt(square);
     for (int k = 0; k < 3; k++) d[k] = d[k] * inverse;
-    es_node_lobe_add_v(job->forest->lobes, vi_gather(cut->node, place), d, light);
+    es_node_lobe_add_v(job->forest->lobes, node, d, light);
 }
 
 static void sum_up(const es_micro_job* job, es_micro_scratch* s, const es_micro_rays* rays, const lanes* here, uint32_t lane, float f90, const unwarped* lobe, float sums[3])
@@ -403,27 +407,28 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
     s->stats.samples += (uint64_t)count * table->size * table->size;
 }
 
-/* Half the range of a lobe's zoom that all texels of a panorama would be needed for. */
-static float zoom_of(const es_micro_job* job, uint32_t first, uint32_t count, float* least)
+/* The zoom with which a panorama's texels in the middle of the sharpest lobe are as dense as that lobe's pixels: size² k² / 4 of them a steradian where there are
+ * 2 size texels a side, as to size² times the density, which is `bound` / pi at its largest (lane_bound). */
+static float zoom_of(const es_micro_job* job, uint32_t first, uint32_t count)
 {
     float most = 1.0f;
-    *least = 3e38f;
     for (uint32_t i = 0; i < count; i++) {
         const es_gather_point* point = &job->points[job->order[first + i]];
         const float sharpness = es_micro_sharpness(point), nv = es_micro_view_cosine(point);
-        /* pi times the density at its largest (lane_bound), as texels are wanted per steradian: size² k² / 4 of them, size² density pixels */
         const float bound = point->model == ES_SURFACE_PHONG ? 0.5f * (sharpness + 1.0f) : 0.5f / ((nv + es_sqrt(sharpness + (1.0f - sharpness) * nv * nv)) * sharpness);
-        const float zoom = es_maxf(es_sqrt(bound * (4.0f / 3.14159265f)), 1.0f);
-        most = es_maxf(most, zoom);
-        *least = es_minf(*least, zoom);
+        most = es_maxf(most, es_sqrt(bound * (4.0f / 3.14159265f)));
     }
     return most;
 }
 
+/* Cells are divided into parts of PART points, these of FEW_POINTS, these into points. */
+enum { PART = 16, FEW_POINTS = 4 };
+
 /* False: the points look too different ways for one panorama. */
 static bool lay_out(const es_micro_job* job, uint32_t first, uint32_t count, const cell* world, es_micro_mapping mapping, common* c)
 {
-    const float size = (float)(job->table->size * (count > 4 ? 5 : 3) / 2), back = 0.5f * size, half = 0.5f * size;
+    /* few points are not worth many texels; with more of them, more is noise that all have in common */
+    const float size = (float)(job->table->size * (count > FEW_POINTS ? 5 : 3) / 2), back = 0.5f * size, half = 0.5f * size;
     const bool lobes = mapping != ES_MICRO_COSINE;
     layout* l = &c->layout;
     *l = (layout){.zoom = 1.0f, .zoomed = lobes || world->sine > 0.5f, .size = {size, back}, .scale = {half, 0.5f * back}, .column = {half + 1.0f, size + 3.0f + 0.5f * back}, .row = {half + 1.0f, 0.5f * back + 1.0f},
@@ -431,8 +436,7 @@ static bool lay_out(const es_micro_job* job, uint32_t first, uint32_t count, con
     if (!l->zoomed) l->scale[0] = half * (1.0f - 0.5f * world->sine) / es_sqrt(1.0f - world->sine * world->sine); /* down to the lowest horizon */
     else if (!lobes) l->zoom = 0.5f; /* what is in front: to 127 degrees */
     if (lobes) {
-        float least;
-        const float zoom = zoom_of(job, first, count, &least), cosine = world->mirror_cosine;
+        const float zoom = zoom_of(job, first, count), cosine = world->mirror_cosine;
         if (cosine < -1.0f) return false;
         /* with k = 1 / tan(β / 2) the density at the border of the mirror directions' cone is highest */
         const float k = es_minf(zoom, es_sqrt((1.0f + cosine) / es_maxf(1.0f - cosine, 1e-6f)));
@@ -448,8 +452,11 @@ static bool lay_out(const es_micro_job* job, uint32_t first, uint32_t count, con
     return true;
 }
 
-/* Nodes that points draw for themselves: more are cheaper drawn by a smaller cell. */
-enum { FEW_NODES = 300, FEW_LEAVES = 300, MANY_ROOTS = 200 };
+/* Nodes that points draw for themselves: more are cheaper drawn by a smaller cell. From so many subtrees on it is not even tried. Without sharing, cells whose
+ * points have so many are wide, and had better be divided. */
+enum { FEW_NODES = 300, FEW_LEAVES = 300, MANY_ROOTS = 200, LARGE_CUT = 12000, LARGE_NEAR = 1500 };
+/* Of what is kept, in texels: the largest radius of a node's sphere. */
+#define LARGEST_NODE 2.0f
 
 /* Is what `outer` left little enough to be drawn by each point? Then it is in the cut. */
 static bool is_little(const es_micro_job* job, const cell* world, float open, uint32_t count, const common* outer, es_micro_scratch* s)
@@ -458,12 +465,13 @@ static bool is_little(const es_micro_job* job, const cell* world, float open, ui
     s->cut.near = ES_MICRO_MAX_CUT;
     const uint32_t roots = outer->roots.end - outer->roots.begin;
     if (roots == 0) return true;
-    return count <= 16 && roots < MANY_ROOTS && find_cut(job, world, open, FEW_NODES, FEW_LEAVES, &outer->roots, outer->end, s);
+    return count <= PART && roots < MANY_ROOTS && find_cut(job, world, open, FEW_NODES, FEW_LEAVES, &outer->roots, outer->end, s);
 }
 
+/* A run of the curve that jumps is not one cell. */
 static bool is_compact(const es_micro_job* job, uint32_t first, uint32_t count, const cell* world, es_micro_mapping mapping)
 {
-    if (count <= 4) return true;
+    if (count <= FEW_POINTS) return true;
     const cell left = bound(job, first, count / 2, mapping), right = bound(job, first + count / 2, count - count / 2, mapping);
     return left.r + right.r > 0.9f * world->r;
 }
@@ -476,16 +484,16 @@ static void gather_cell(const es_micro_job* job, uint32_t first, uint32_t count,
     common own = {.outer = outer, .level = level};
     bool direct = outer && is_little(job, &world, open, count, outer, s);
     if (!direct && shares && level < ES_MICRO_LEVELS && is_compact(job, first, count, &world, mapping) && lay_out(job, first, count, &world, mapping, &own)) {
-        const float texel = 2.0f / own.layout.scale[0];
+        const float texel = LARGEST_NODE / own.layout.scale[0];
         if (draw_panorama(job, &world, &own, texel * texel, s)) {
             outer = &own;
             s->stats.drawn += own.end - own.first;
             direct = is_little(job, &world, open, count, outer, s);
         }
     }
-    if (!direct && !outer && count <= 16) direct = find_cut(job, &world, open, shares ? FEW_NODES : 12000, 1500, NULL, 0, s);
+    if (!direct && !outer && count <= PART) direct = find_cut(job, &world, open, shares ? FEW_NODES : LARGE_CUT, LARGE_NEAR, NULL, 0, s);
     if (!direct && count > 1) {
-        const uint32_t part = count > 16 ? 16 : count > 4 && shares ? 4 : count > 8 ? 8 : 1;
+        const uint32_t part = count > PART ? PART : count > FEW_POINTS && shares ? FEW_POINTS : count > VW ? VW : 1;
         for (uint32_t i = 0; i < count; i += part) gather_cell(job, first + i, count - i < part ? count - i : part, mapping, outer, level + (outer == &own), s);
         return;
     }

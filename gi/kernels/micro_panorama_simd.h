@@ -276,7 +276,10 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             }
             const vf most = vf_set1(f->open) * (wide * wide), square = v.r * v.r;
             const vm opened = vm_gt(square, most);
-            uint32_t kept = vm_bits(seen & ~opened & ~close), down = vm_bits(seen & (opened | close));
+            const uint32_t leaves = ~vm_bits(vi_gt(vi_set1((int32_t)tree->leaf_count), at));
+            uint32_t kept = vm_bits(seen & ~opened & ~close), down = vm_bits(seen & (opened | close)), large = trees ? 0 : down & leaves & ~vm_bits(close);
+            down &= ~large;
+            if (!f->job->settings.ray_cast) kept |= large, large = 0;
             if (kept) {
                 if (cut->count + VW > ES_MICRO_MAX_FAR) {
                     f->full = true;
@@ -300,9 +303,6 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
                 }
                 if (f->staged > ES_MICRO_STAGE - VW) flush_far(f);
             }
-            const uint32_t leaves = ~vm_bits(vi_gt(vi_set1((int32_t)tree->leaf_count), at));
-            uint32_t large = trees ? 0 : down & leaves & ~vm_bits(close);
-            down &= ~large;
             if (large && cut->count + VW > ES_MICRO_MAX_FAR) {
                 f->full = true;
                 break;

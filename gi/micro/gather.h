@@ -10,11 +10,12 @@ enum {
     ES_MICRO_LANES = 8,
     ES_MICRO_CELL = 64,           /* points that share what is far (kernels/micro_panorama_simd.h) */
     ES_MICRO_LEVELS = 4,          /* cells of 64, 16, 4 points, and points */
-    ES_MICRO_CHART = 80,          /* texels a side of what is shared, at most */
+    ES_MICRO_CHART = 80,          /* texels a side of a panorama's larger chart, at most: 5/2 of the largest buffer's */
+    /* words of a panorama: rows with a border, of two charts and borders at the most, in eights */
     ES_MICRO_PANORAMA = (ES_MICRO_CHART + 2) * (ES_MICRO_CHART * 3 / 2 + 12),
-    ES_MICRO_MAX_FAR = 49152,     /* nodes of what is shared, at most */
-    ES_MICRO_STAGE = 256,
-    ES_MICRO_MAX_ROOTS = 4096,
+    ES_MICRO_MAX_FAR = 49152,     /* nodes of a point's panoramas, at most; the rest of the cut is for what it draws itself */
+    ES_MICRO_STAGE = 256,         /* nodes that are drawn into a panorama at once */
+    ES_MICRO_MAX_ROOTS = 4096,    /* subtrees that a panorama leaves to others, at most */
     ES_MICRO_PIXELS = ES_MICRO_MAX_SIZE * ES_MICRO_MAX_SIZE,
     ES_MICRO_MARGIN = ES_MICRO_MAX_SIZE + 8, /* empty words before and behind a buffer */
     ES_MICRO_LANE = ES_MICRO_PIXELS + 2 * ES_MICRO_MARGIN, /* from one buffer to the next: not a multiple of what would put all into the same sets of a cache */
