@@ -455,7 +455,7 @@ static bool lay_out(const es_micro_job* job, uint32_t first, uint32_t count, con
 /* Nodes that points draw for themselves: more are cheaper drawn by a smaller cell. From so many subtrees on it is not even tried. Without sharing, cells whose
  * points have so many are wide, and had better be divided. */
 enum { FEW_NODES = 300, FEW_LEAVES = 300, MANY_ROOTS = 200, LARGE_CUT = 12000, LARGE_NEAR = 1500 };
-/* Of what is kept, in texels: the largest radius of a node's sphere. */
+/* Of a node's sphere that is drawn into a panorama, the largest radius, in texels; above it four texels have holes between them. */
 #define LARGEST_NODE 2.0f
 
 /* Is what `outer` left little enough to be drawn by each point? Then it is in the cut. */
@@ -473,7 +473,7 @@ static bool is_compact(const es_micro_job* job, uint32_t first, uint32_t count, 
 {
     if (count <= FEW_POINTS) return true;
     const cell left = bound(job, first, count / 2, mapping), right = bound(job, first + count / 2, count - count / 2, mapping);
-    return left.r + right.r > 0.9f * world->r;
+    return left.r + right.r >= 0.9f * world->r;
 }
 
 static void gather_cell(const es_micro_job* job, uint32_t first, uint32_t count, es_micro_mapping mapping, const common* outer, uint32_t level, es_micro_scratch* s)
@@ -484,7 +484,7 @@ static void gather_cell(const es_micro_job* job, uint32_t first, uint32_t count,
     common own = {.outer = outer, .level = level};
     bool direct = outer && is_little(job, &world, open, count, outer, s);
     if (!direct && shares && level < ES_MICRO_LEVELS && is_compact(job, first, count, &world, mapping) && lay_out(job, first, count, &world, mapping, &own)) {
-        const float texel = LARGEST_NODE / own.layout.scale[0];
+        const float texel = es_minf(es_sqrt(job->settings.cut), LARGEST_NODE) / own.layout.scale[0];
         if (draw_panorama(job, &world, &own, texel * texel, s)) {
             outer = &own;
             s->stats.drawn += own.end - own.first;

@@ -5,7 +5,8 @@
  * A point looks along each of its rays into the pictures. It guesses that what it sees is as far as what it saw by the ray beside it; where that is, seen from the
  * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). Two looks are enough: with a guess
  * of infinity, three were worse. Where a
- * look finds nothing, what is left out may be in the way, and the next one is to where that ends; one that found something holds: what is near is nearer in any case.
+ * look finds nothing, what is left out may be in the way, and the next one is to where that ends; what it finds counts if it is about there. What a look has found
+ * holds: what is near is nearer in any case.
  *
  * The picture is a map of directions (x, y, z), z along the cell's axis, in one chart or two. First the sphere is turned into itself by the conformal map that
  * multiplies tan(θ/2) by k: of a direction of length ρ
@@ -172,7 +173,8 @@ static void cast_far(const es_micro_job* job, es_micro_canvas* p, const layout* 
     const vf limit = vf_set1(-1e-9f), zero = vf_zero();
     if (!(facing < 0.0f)) return;
     uint32_t x0 = 0, x1 = stride / VW - 1, y0 = 0, y1 = rows - 1;
-    if (radius * inverse < 0.4f) { /* where it is within one chart, a window */
+    /* where it is within one chart, and angles grow nearly as at its middle, a window */
+    if (radius * inverse * (l->zoomed ? es_maxf(l->zoom, 1.0f) : 1.0f) < 0.4f) {
         vf u, v, across, along;
         vm behind;
         chart(l, vf_set1(c[0] * inverse), vf_set1(c[1] * inverse), vf_set1(c[2] * inverse), vf_set1(1.0f), &u, &v, &behind);
@@ -266,7 +268,8 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             const vm seen = above & vm_gt(facing + reach, zero) & vm_gt(v.r, zero) & vm_first((int32_t)(count - i));
             if (!vm_any(seen)) continue;
             const vf z = vf_set1(f->axes[2][0]) * dx + vf_set1(f->axes[2][1]) * dy + vf_set1(f->axes[2][2]) * dz;
-            const vm close = vm_lt(d - v.r, vf_set1(f->near));
+            /* leaves that some point may lie on are for the points to tell from their own surface */
+            const vm leaf = ~vi_gt(vi_set1((int32_t)tree->leaf_count), at), close = vm_lt(d - v.r, vf_set1(f->near)) | (leaf & vm_lt(d, vf_set1(2.0f) * v.r + r));
             /* radius / d times growth(), across */
             vf wide = vf_max(d + vf_set1(0.5f) * z, vf_set1(0.5f) * d);
             if (f->layout.zoomed) {
@@ -276,7 +279,7 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             }
             const vf most = vf_set1(f->open) * (wide * wide), square = v.r * v.r;
             const vm opened = vm_gt(square, most);
-            const uint32_t leaves = ~vm_bits(vi_gt(vi_set1((int32_t)tree->leaf_count), at));
+            const uint32_t leaves = vm_bits(leaf);
             uint32_t kept = vm_bits(seen & ~opened & ~close), down = vm_bits(seen & (opened | close)), large = trees ? 0 : down & leaves & ~vm_bits(close);
             down &= ~large;
             if (!f->job->settings.ray_cast) kept |= large, large = 0;
@@ -310,6 +313,7 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             for (; large; large &= large - 1) {
                 const uint32_t k = (uint32_t)__builtin_ctz(large), slot = cut->count;
                 flush_far(f);
+                if (forest->lobes) put_middles(tree, v.c, 1u << k, cut);
                 cut->count++;
                 float c[3], n[3];
                 for (int j = 0; j < 3; j++) {
@@ -318,11 +322,6 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
                 }
                 cut->radiance[slot] = (uint32_t)v.radiance[k];
                 cut->node[slot] = tree->first + wave[i + k];
-                if (forest->lobes) {
-                    cut->count--;
-                    put_middles(tree, v.c, 1u << k, cut);
-                    cut->count++;
-                }
                 cast_far(f->job, p, &f->layout, f->rows, f->stride, c, n, v.r[k], slot);
             }
             uint32_t left = down & leaves;
@@ -412,7 +411,7 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
     p->rows = (uint32_t)l->size[0] + 2;
     p->stride = (p->rows + (l->zoomed ? (uint32_t)l->size[1] + 2 : 0) + 7) / 8 * 8;
     s->canvas.has_rays = false;
-    far_finder f = {.job = job, .s = s, .layout = c->layout, .here = *world, .open = open, .near = job->settings.share * world->r, .front = 0.5f / l->zoom, .behind = 0.5f / l->zoom * l->scale[0] / l->scale[1], .rows = p->rows, .stride = p->stride, .root_count = begin, .root_end = begin + ES_MICRO_MAX_ROOTS};
+    far_finder f = {.job = job, .s = s, .layout = c->layout, .here = *world, .open = open, .near = es_maxf(job->settings.share, 1.0f) * world->r, .front = 0.5f / l->zoom, .behind = 0.5f / l->zoom * l->scale[0] / l->scale[1], .rows = p->rows, .stride = p->stride, .root_count = begin, .root_end = begin + ES_MICRO_MAX_ROOTS};
     memcpy(f.axes, c->axes, sizeof f.axes);
     uint32_t trees = 0;
     c->near = f.near;
@@ -441,7 +440,8 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
 
 /* ---- looking ---------------------------------------------------------------------------------------------------------------------------- */
 
-enum { LOOKS = 2 };
+/* At the most; the last is of those that have found nothing yet. */
+enum { LOOKS = 3 };
 
 /* A point in the cell's axes, from its middle; columns of `turn` are the point's axes there. */
 typedef struct onlooker { float offset[3], turn[3][3], near; } onlooker;
@@ -469,6 +469,11 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
             blind[i] = vi_zero();
         }
         for (int look = 0; look < LOOKS; look++) {
+            if (look == LOOKS - 1) {
+                vm any = vi_zero();
+                for (uint32_t i = 0; i < n; i++) any = any | blind[i];
+                if (!vm_any(any)) break;
+            }
             for (uint32_t i = 0; i < n; i++) {
                 const vf qx = vf_set1(o->offset[0]) + t[i] * x[i], qy = vf_set1(o->offset[1]) + t[i] * y[i], qz = vf_set1(o->offset[2]) + t[i] * z[i];
                 rho[i] = vf_sqrt(qx * qx + qy * qy + qz * qz);
@@ -477,10 +482,11 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
             for (uint32_t i = 0; i < n; i++) {
                 const vi found = vi_gather(p->words, at[i]);
                 const vf distance = vf_sqrt(share_of(found)) * extent;
-                const vm there = ~vi_eq(found, empty) & (~blind[i] | vm_lt(distance, vf_set1(2.0f) * rho[i]));
+                const vm is = ~vi_eq(found, empty), there = is & (~blind[i] | vm_lt(distance, vf_set1(2.0f) * rho[i]));
+                const vm wanted = look == LOOKS - 1 ? blind[i] : vm_all_lanes();
+                word[i] = vi_select(there & wanted, found, word[i]);
+                t[i] = vf_select(wanted, vf_select(is, vf_max(t[i] + distance - rho[i], zero), vf_set1(o->near)), t[i]);
                 blind[i] = ~there;
-                word[i] = vi_select(there, found, word[i]);
-                t[i] = vf_select(there, vf_max(t[i] + distance - rho[i], zero), vf_set1(o->near));
             }
         }
         for (uint32_t i = 0; i < n; i++) {

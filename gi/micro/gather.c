@@ -1,4 +1,4 @@
-/* Gather points in the order of a space-filling curve, in cells that share a cut (Ritschel thesis §6.3.1), to the kernel. */
+/* Gather points in the order of a space-filling curve, in cells that share what is far and cuts (Ritschel thesis §6.3.1), to the kernel. */
 #include "gi/micro/gather.h"
 
 #include <string.h>

@@ -29,13 +29,13 @@ typedef struct es_micro_settings {
     float cut;             /* a node is drawn, not opened, when its sphere's solid angle is at most this share of pi / size², or of a lobe's pixel there */
     float cover;           /* cosine-distributed pixels: a node is drawn into the one whose ray is nearest to its centre, where a disc of so many times its area covers
                             * that ray; lobes': into the pixel of its centre. Gaps are closed */
-    float share;           /* what is further than this many radii of a cell of points is seen from the cell's middle, and looked up there; 0: each point sees for itself */
+    float share;           /* what is further than this many radii of a cell of points is seen from the cell's middle, and looked up there; less than 1 is as 1; 0: each point sees for itself */
     bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn into one pixel */
     bool warp;             /* pixels are distributed as the lobe is; off: as the cosine, and weighted */
     bool quantised;        /* nodes of 128 bits; off: floats */
 } es_micro_settings;
 
-typedef struct es_micro_stats { uint64_t samples, drawn, cast; } es_micro_stats; /* pixels of micro-buffers; nodes of the cuts times points; leaves met by rays times points */
+typedef struct es_micro_stats { uint64_t samples, drawn, cast; } es_micro_stats; /* pixels of micro-buffers; nodes of the cuts times points, and of what is shared once; leaves met by rays times points, where they are not shared */
 
 /* What one pixel of a micro-buffer holds. */
 typedef struct es_micro_pixel {
