@@ -692,6 +692,7 @@ typedef struct exr_writer {
     uint8_t* rows;  /* one chunk's samples, channel after channel */
     size_t rows_size;
     bool no_memory; /* and the context has said so */
+    exr_result_t (*compress)(exr_encode_pipeline_t* encode); /* the library's */
 } exr_writer;
 
 /* A write context is locked while it reports, so nothing may be asked of it here; the code says enough. */
@@ -717,6 +718,15 @@ static void gather_rows(exr_writer* writer, uint32_t channel, uint32_t first_row
             }
         }
     }
+}
+
+/* The library stores what compressing makes larger as it was, and reads what is as large as it was as not compressed; but it leaves in the file what compressing
+ * made exactly as large. */
+static exr_result_t compress_to_less(exr_encode_pipeline_t* encode)
+{
+    const exr_result_t code = ((exr_writer*)encode->encoding_user_data)->compress(encode);
+    if (code == EXR_ERR_SUCCESS && encode->compressed_bytes == encode->packed_bytes) memcpy(encode->compressed_buffer, encode->packed_buffer, (size_t)encode->packed_bytes);
+    return code;
 }
 
 static exr_result_t write_chunks(exr_writer* writer)
@@ -749,7 +759,12 @@ static exr_result_t write_chunks(exr_writer* writer)
             info->user_line_stride = (int32_t)(writer->sample_size * image->width);
             info->encode_from_ptr = out;
         }
-        if (y == 0 && (code = exr_encoding_choose_default_routines(writer->file, 0, &encode)) != EXR_ERR_SUCCESS) break;
+        if (y == 0) {
+            if ((code = exr_encoding_choose_default_routines(writer->file, 0, &encode)) != EXR_ERR_SUCCESS) break;
+            writer->compress = encode.compress_fn;
+            encode.encoding_user_data = writer;
+            if (encode.compress_fn) encode.compress_fn = compress_to_less;
+        }
         code = exr_encoding_run(writer->file, 0, &encode);
     }
     if (encode.context) exr_encoding_destroy(writer->file, &encode);
