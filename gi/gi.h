@@ -145,7 +145,7 @@ typedef struct es_renderer_settings {
     uint32_t micro_spacing;          /* 1, 2, 4: light is gathered at every so manieth pixel of every so manieth row, and interpolated along surfaces, what
                                       * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
     float micro_cut;                 /* a node is drawn, not opened, when its sphere's solid angle is at most this share of that of a pixel above the surface,
-                                      * pi / micro_size²; of a lobe's pixel, there */
+                                      * pi / micro_size²; of a lobe's pixel, there; what is shared is as with 4 at the most */
     float micro_share;               /* what is further than so many radii of a cell of up to 64 gather points is drawn once, from the cell's middle, and looked up by each of
                                       * them: more is slower and nearer to the truth; less than 1 is as 1; 0: each point draws all that it sees */
     float micro_cover;               /* it is drawn where a disc of so many times its area covers the ray through the pixel: with 1 things are as wide as they are, but have

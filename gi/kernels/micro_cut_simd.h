@@ -119,12 +119,26 @@ VINL vi levels_down(vf square, vf most)
     return vi_min(vi_max(exponents + vi_set1(1), vi_set1(1)), vi_set1(3));
 }
 
-/* Writes 8 words; how many of them are wanted. */
-VINL uint32_t descend(uint32_t node, int32_t levels, uint32_t leaf_count, uint32_t* to)
+/* A tree's nodes, as the traversals read them. */
+typedef struct tree_nodes { const es_point_node* packed; const es_point_node_float* floats; const float* areas; uint32_t leaf_count; } tree_nodes;
+
+VINL tree_nodes nodes_of(const es_point_forest* forest, const es_point_tree* tree, bool quantised)
 {
-    while (levels > 1 && node << levels >= 2 * leaf_count) levels--;
+    return (tree_nodes){forest->nodes + tree->first, quantised ? NULL : forest->float_nodes + tree->first, forest->area + tree->first, tree->leaf_count};
+}
+
+/* Puts a node's descendants, so many levels down, on the next wave, and asks for them, as they are read only when this wave is through. Writes 8 words; how many of
+ * them are wanted. */
+VINL uint32_t descend(const tree_nodes* nodes, uint32_t node, int32_t levels, uint32_t* to)
+{
+    while (levels > 1 && node << levels >= 2 * nodes->leaf_count) levels--;
     vi_store(to, vi_set1((int32_t)(node << levels)) + vi_iota());
-    return 1u << levels;
+    const uint32_t count = 1u << levels;
+    const size_t first = node << levels, last = first + count - 1;
+    if (nodes->floats) __builtin_prefetch(nodes->floats + last);
+    else __builtin_prefetch(nodes->packed + first), __builtin_prefetch(nodes->packed + last);
+    __builtin_prefetch(nodes->areas + last);
+    return count;
 }
 
 typedef struct finder {
@@ -174,15 +188,14 @@ VINL void keep(finder* f, const es_point_tree* tree, const nodes_v* v, vi slot, 
 VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uint32_t count, uint32_t* trees, uint32_t* tree_count)
 {
     const es_point_forest* forest = f->job->forest;
-    const es_point_node* packed = forest->nodes + tree->first;
-    const es_point_node_float* floats = quantised ? NULL : forest->float_nodes + tree->first;
+    const tree_nodes nodes = nodes_of(forest, tree, quantised);
     uint32_t *wave = f->s->wave[0], *next = f->s->wave[1];
     while (count && !f->full) {
         uint32_t opened_count = 0;
         for (uint32_t i = count; i < (count + 7) / 8 * 8; i++) wave[i] = 1;
         for (uint32_t i = 0; i < count; i += VW) {
             const vi at = vi_load(wave + i);
-            const nodes_v v = quantised ? load_quantised(tree, packed, at) : load_float(floats, packed, at);
+            const nodes_v v = quantised ? load_quantised(tree, nodes.packed, at) : load_float(nodes.floats, nodes.packed, at);
             vm opened;
             vf excess;
             const vm seen = classify(&f->here, &v, f->open, &opened, &excess) & vm_first((int32_t)(count - i));
@@ -198,10 +211,7 @@ VINL void find_in_tree(finder* f, const es_point_tree* tree, bool quantised, uin
             }
             for (; down; down &= down - 1) {
                 const uint32_t k = (uint32_t)__builtin_ctz(down);
-                opened_count += descend(wave[i + k], levels[k], tree->leaf_count, next + opened_count);
-                const size_t below = next[opened_count - 1];
-                if (quantised) __builtin_prefetch(packed + below), __builtin_prefetch(packed + below - (1u << levels[k]) + 1);
-                else __builtin_prefetch(floats + below);
+                opened_count += descend(&nodes, wave[i + k], levels[k], next + opened_count);
             }
             if (!left) continue;
             if (!trees) keep(f, tree, &v, at + vi_set1((int32_t)tree->first), left, true);
@@ -280,7 +290,7 @@ static cell turned(const es_point_tree* tree, const cell* world)
     return here;
 }
 
-/* Nodes to begin with: a run of the scratch's roots; NULL: all there is. */
+/* Nodes to begin with: a run of the scratch's roots. */
 typedef struct beginnings { uint32_t begin, end; } beginnings;
 
 /* The next tree of a run and its roots, to the first wave. */

@@ -3,10 +3,9 @@
  * draw pictures of their own of what they were left, and in the end to each point.
  *
  * A point looks along each of its rays into the pictures. It guesses that what it sees is as far as what it saw by the ray beside it; where that is, seen from the
- * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). Two looks are enough: with a guess
- * of infinity, three were worse. Where a
- * look finds nothing, what is left out may be in the way, and the next one is to where that ends; what it finds counts if it is about there. What a look has found
- * holds: what is near is nearer in any case.
+ * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). Where a look finds nothing, what is
+ * left out may be in the way, and the next one is to where that ends; what it finds counts if it is about there. What a look has found holds: what is near is
+ * nearer in any case.
  *
  * The picture is a map of directions (x, y, z), z along the cell's axis, in one chart or two. First the sphere is turned into itself by the conformal map that
  * multiplies tan(θ/2) by k: of a direction of length ρ
@@ -243,9 +242,7 @@ static void put_middles(const es_point_tree* tree, const vf local[3], uint32_t b
 VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, bool quantised, uint32_t count, uint32_t* trees, uint32_t* tree_count)
 {
     const es_point_forest* forest = f->job->forest;
-    const es_point_node* packed = forest->nodes + tree->first;
-    const es_point_node_float* floats = quantised ? NULL : forest->float_nodes + tree->first;
-    const float* areas = forest->area + tree->first;
+    const tree_nodes nodes = nodes_of(forest, tree, quantised);
     es_micro_cut* cut = &f->s->cut;
     es_micro_canvas* p = &f->s->canvas;
     const cell* cell = &f->here;
@@ -256,7 +253,7 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
         for (uint32_t i = count; i < (count + 7) / 8 * 8; i++) wave[i] = 1;
         for (uint32_t i = 0; i < count; i += VW) {
             const vi at = vi_load(wave + i);
-            const nodes_v v = quantised ? load_quantised(tree, packed, at) : load_float(floats, packed, at);
+            const nodes_v v = quantised ? load_quantised(tree, nodes.packed, at) : load_float(nodes.floats, nodes.packed, at);
             /* as classify() has it */
             const vf dx = v.c[0] - vf_set1(cell->c[0]), dy = v.c[1] - vf_set1(cell->c[1]), dz = v.c[2] - vf_set1(cell->c[2]);
             const vf ax = vf_set1(cell->axis[0]), ay = vf_set1(cell->axis[1]), az = vf_set1(cell->axis[2]);
@@ -294,7 +291,7 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
                 vf_store(y, vf_set1(f->axes[1][0]) * dx + vf_set1(f->axes[1][1]) * dy + vf_set1(f->axes[1][2]) * dz);
                 vf_store(h, z);
                 if (forest->lobes) put_middles(tree, v.c, kept, cut);
-                vf_store(size, vf_set1(f->job->settings.cover * 0.318309886f) * vf_gather(areas, at) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one));
+                vf_store(size, vf_set1(f->job->settings.cover * 0.318309886f) * vf_gather(nodes.areas, at) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one));
                 for (; kept; kept &= kept - 1) {
                     const uint32_t k = (uint32_t)__builtin_ctz(kept), to = f->staged++, slot = cut->count++;
                     p->stage[0][to] = x[k];
@@ -352,11 +349,7 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             vi_store(levels, levels_down(square, most));
             for (; down; down &= down - 1) {
                 const uint32_t k = (uint32_t)__builtin_ctz(down);
-                opened_count += descend(wave[i + k], levels[k], tree->leaf_count, next + opened_count);
-                const size_t below = next[opened_count - 1];
-                if (quantised) __builtin_prefetch(packed + below), __builtin_prefetch(packed + below - (1u << levels[k]) + 1);
-                else __builtin_prefetch(floats + below);
-                __builtin_prefetch(areas + below);
+                opened_count += descend(&nodes, wave[i + k], levels[k], next + opened_count);
             }
         }
         uint32_t* swapped = wave;
