@@ -98,7 +98,8 @@ VINL void growth(const layout* l, vf z, vf* across, vf* along)
 VINL void draw_far(const es_micro_job* job, es_micro_canvas* p, uint32_t stride, const layout* l, uint32_t from, vi slot, vm lanes)
 {
     const vf one = vf_set1(1.0f), zero = vf_zero();
-    const vf dx = vf_load(p->stage[0] + from), dy = vf_load(p->stage[1] + from), dz = vf_load(p->stage[2] + from);
+    /* other lanes may hold anything, signalling NaNs too */
+    const vf dx = vf_and(lanes, vf_load(p->stage[0] + from)), dy = vf_and(lanes, vf_load(p->stage[1] + from)), dz = vf_and(lanes, vf_load(p->stage[2] + from)), size = vf_and(lanes, vf_load(p->stage[3] + from));
     const vf d2 = vf_max(dx * dx + dy * dy + dz * dz, vf_set1(1e-30f)), inverse = one / vf_sqrt(d2), x = dx * inverse, y = dy * inverse, z = dz * inverse;
     vf u, v, across, along, scale = vf_set1(l->scale[0]), c = vf_set1(l->column[0]), r = vf_set1(l->row[0]), left = zero, last = vf_set1(l->size[0]);
     vm behind;
@@ -115,7 +116,7 @@ VINL void draw_far(const es_micro_job* job, es_micro_canvas* p, uint32_t stride,
     const vf column = u * scale + c - vf_set1(0.5f), row = v * scale + r - vf_set1(0.5f); /* from texels' middles */
     const vf c0 = vf_floor(column), r0 = vf_floor(row);
     const vm inside = lanes & vm_ge(c0, left) & vm_le(c0, left + last) & vm_ge(r0, zero) & vm_le(r0, last);
-    const vf limit = vf_load(p->stage[3] + from) * (inverse * inverse) * (scale * scale), across2 = one / (across * across), more = one / (along * along) - across2;
+    const vf limit = size * (inverse * inverse) * (scale * scale), across2 = one / (across * across), more = one / (along * along) - across2;
     const vi at = vi_truncate(vf_min(vf_max(r0, zero), last) * vf_set1((float)stride) + vf_min(vf_max(c0, left), left + last));
     const vi key = depth_of(d2, job->inverse_square) | slot;
     const vf fx = c0 - column, fy = r0 - row;
