@@ -479,6 +479,59 @@ static void test_motion(void** state)
     es_context_destroy(context);
 }
 
+/* What leaves send, by which points they are: the same for as long as these are. */
+static uint32_t mark_of(const es_point_forest* f, size_t leaf) { return es_hash_u32(f->triangle[leaf]) ^ f->barycentric[leaf]; }
+static es_point_lobe lobe_of_mark(uint32_t mark) { return (es_point_lobe){es_pack_rgb9e5(es_v3(1 + (float)(mark & 255), 1, 1)), mark, es_hash_u32(mark), mark & 0x7fffffff}; }
+
+/* Light goes where its leaf goes when a tree is split anew, lobes as well, and goes out where points are placed anew; above leaves it is always theirs. */
+static void test_light_follows(void** state)
+{
+    es_context* context = new_context(1, 0);
+    scene* s = new_scene();
+    s->materials[0].metallic = 1;
+    s->materials[0].roughness = 0.3f;
+    es_point_forest f = {0};
+    bring(context, &f, s, POINTS / 8);
+    assert_true(f.trees[0].glossy && f.tree_count > 1);
+    assert_int_equal(es_forest_keep_lobes(context, &f), ES_OK);
+    for (uint32_t t = 0; t < f.tree_count; t++)
+        for (uint32_t k = 0; k < f.trees[t].leaf_count; k++) {
+            const size_t node = f.trees[t].first + f.trees[t].leaf_count + k, leaf = f.trees[t].first_leaf + k;
+            f.radiance[0][node] = (float)(mark_of(&f, leaf) & 65535);
+            if (f.trees[t].glossy) f.lobes[node] = lobe_of_mark(mark_of(&f, leaf));
+        }
+    es_forest_pull(context, &f);
+    const es_point_tree tree = f.trees[0];
+    uint32_t* before = malloc(tree.leaf_count * sizeof *before);
+    memcpy(before, f.triangle + tree.first_leaf, tree.leaf_count * sizeof *before);
+    for (int turn = 0; turn < 2; turn++) {
+        if (turn) /* at rest it is another */
+            for (int i = 0; i < VERTICES; i++) s->rest[4 * i] *= 1.01f;
+        bend(s, turn ? 0.1f : 3.0f, 4 + (uint64_t)turn);
+        const es_forest_update update = bring(context, &f, s, POINTS / 8);
+        assert_int_equal(update.built, 1);
+        assert_int_equal(f.trees[0].leaf_count, tree.leaf_count);
+        if (!turn) assert_true(memcmp(before, f.triangle + tree.first_leaf, tree.leaf_count * sizeof *before) != 0); /* they have changed places */
+        assert_non_null(f.lobes);
+        for (uint32_t k = 0; k < tree.leaf_count; k++) {
+            const size_t node = tree.first + tree.leaf_count + k;
+            const es_point_lobe lobe = turn ? (es_point_lobe){0} : lobe_of_mark(mark_of(&f, tree.first_leaf + k));
+            assert_memory_equal(&f.lobes[node], &lobe, sizeof lobe);
+            assert_true(f.radiance[0][node] == (turn ? 0.0f : (float)(mark_of(&f, tree.first_leaf + k) & 65535)));
+        }
+        const uint64_t light = es_hash_bytes(hash_forest(&f), f.lobes + tree.first + 1, (2 * (size_t)tree.leaf_count - 1) * sizeof *f.lobes);
+        const es_point_lobe top = f.lobes[f.top.first + 1];
+        es_forest_pull(context, &f);
+        assert_true(es_hash_bytes(hash_forest(&f), f.lobes + tree.first + 1, (2 * (size_t)tree.leaf_count - 1) * sizeof *f.lobes) == light);
+        assert_memory_equal(&f.lobes[f.top.first + 1], &top, sizeof top);
+    }
+    free(before);
+    es_forest_free(context, &f);
+    free(s);
+    assert_int_equal(es_context_bytes(context), 0);
+    es_context_destroy(context);
+}
+
 static void test_materials(void** state)
 {
     es_context* context = new_context(1, 0);
@@ -674,6 +727,7 @@ int main(void)
         cmocka_unit_test(test_structure),
         cmocka_unit_test(test_blue_noise),
         cmocka_unit_test(test_motion),
+        cmocka_unit_test(test_light_follows),
         cmocka_unit_test(test_materials),
         cmocka_unit_test(test_stress),
         cmocka_unit_test(test_scarcity),

@@ -344,18 +344,19 @@ static es_result lay_out(es_context* context, es_point_forest* forest, const es_
 
 /* ---- building ----------------------------------------------------------------------------------------------------------------------- */
 
-typedef struct ordering { const es_split_point* points; const uint32_t* from; uint32_t* to; } ordering;
+typedef struct ordering { const es_split_point* points; const uint32_t* from; uint32_t* to; size_t words; } ordering;
 
 static void order_some(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const ordering* o = user;
-    for (uint32_t i = begin; i < end; i++) o->to[i] = o->from[o->points[i].index];
+    for (uint32_t i = begin; i < end; i++)
+        for (size_t k = 0; k < o->words; k++) o->to[i * o->words + k] = o->from[o->points[i].index * o->words + k];
 }
 
-/* to[i] = from[the split's i-th] */
-static void put_in_order(es_context* context, const es_split_point* points, const void* from, void* to, uint32_t count)
+/* to[i] = from[the split's i-th], of so many words each */
+static void put_in_order(es_context* context, const es_split_point* points, const void* from, void* to, uint32_t count, size_t words)
 {
-    ordering o = {points, from, to};
+    ordering o = {points, from, to, words};
     es_parallel_for(context, count, 16384, order_some, &o);
 }
 
@@ -397,8 +398,10 @@ static es_result rebuild(es_context* context, es_point_forest* forest, uint32_t 
 {
     const es_point_tree* tree = &forest->trees[index];
     const uint32_t count = tree->leaf_count;
+    const bool lobes = forest->lobes && tree->glossy;
+    const size_t lobe_words = sizeof *forest->lobes / sizeof(uint32_t), scratch_size = (lobes ? lobe_words : 1) * sizeof(uint32_t);
     es_split_point* points = es_allocate_array(context, count, sizeof *points);
-    uint32_t* scratch = points ? es_allocate_array(context, count, sizeof *scratch) : NULL;
+    uint32_t* scratch = points ? es_allocate_array(context, count, scratch_size) : NULL;
     if (scratch) {
         const size_t node = tree->first + count, leaf = tree->first_leaf;
         es_forest_stand(context, forest, index, points);
@@ -408,10 +411,14 @@ static es_result rebuild(es_context* context, es_point_forest* forest, uint32_t 
             shapes->across + leaf, shapes->shear + leaf, forest->albedo + node, forest->emission + node, forest->radiance[0] + node, forest->radiance[1] + node, forest->radiance[2] + node};
         for (int k = 0; k < 13; k++) {
             memcpy(scratch, arrays[k], count * sizeof *scratch);
-            put_in_order(context, points, scratch, arrays[k], count);
+            put_in_order(context, points, scratch, arrays[k], count, 1);
+        }
+        if (lobes) {
+            memcpy(scratch, forest->lobes + node, count * sizeof *forest->lobes);
+            put_in_order(context, points, scratch, forest->lobes + node, count, lobe_words);
         }
     }
-    es_release(context, scratch, count * sizeof *scratch);
+    es_release(context, scratch, count * scratch_size);
     es_release(context, points, count * sizeof *points);
     return scratch ? ES_OK : es_context_last_result(context);
 }
@@ -427,6 +434,15 @@ static es_result examine_all(es_context* context, const es_point_forest* forest,
         if (result) return result;
     }
     return ES_OK;
+}
+
+/* Of points that were not there before. */
+static void darken(es_point_forest* forest, const es_point_tree* tree)
+{
+    const size_t nodes = 2 * (size_t)tree->leaf_count;
+    for (int c = 0; c < 3; c++) memset(forest->radiance[c] + tree->first, 0, nodes * sizeof(float));
+    for (size_t k = 0; k < nodes; k++) forest->nodes[tree->first + k].radiance = 0;
+    if (forest->lobes) memset(forest->lobes + tree->first, 0, nodes * sizeof *forest->lobes);
 }
 
 /* What a tree's state asks for against its instance; true: its points have to be placed. */
@@ -483,12 +499,10 @@ static es_result update(es_context* context, es_point_forest* forest, const es_d
             if (result) return result;
             state->base = -1.0;
             state->linked = false;
-            for (int c = 0; c < 3; c++) memset(forest->radiance[c] + tree->first, 0, 2 * (size_t)tree->leaf_count * sizeof(float));
-            for (uint32_t k = 0; k < 2 * tree->leaf_count; k++) forest->nodes[tree->first + k].radiance = 0;
+            darken(forest, tree);
+            light = true;
         }
-        if (read) {
-            es_forest_read_looks(context, forest, list, i);
-        }
+        if (read) es_forest_read_looks(context, forest, list, i);
         if (!state->work) continue;
         changed = true;
         nodes = nodes || state->work & ES_TREE_NODES;

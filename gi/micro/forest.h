@@ -95,7 +95,8 @@ typedef struct es_forest_update {
 } es_forest_update;
 
 /* Brings the forest up to the draw list and to the materials of that revision; what has not changed is left alone. Light is kept where the tree is, 0 where it
- * is new. From all zero, or again. A list without area gives no trees. */
+ * is new, and no lobes are kept when there are other trees than before, or other trees are glossy: light all again when the version differs. From all zero, or
+ * again. A list without area gives no trees. */
 es_result es_forest_bring(es_context* context, es_point_forest* forest, const es_draw_list* list, uint64_t materials, const es_forest_request* request, es_forest_update* update);
 void es_forest_free(es_context* context, es_point_forest* forest);
 
