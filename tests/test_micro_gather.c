@@ -14,6 +14,7 @@
 #include "gi/micro/micro.h"
 #include "gi/surface.h"
 #include "platform/context.h"
+#include "tests/same_bits.h"
 #include "tests/small_worlds.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -285,37 +286,28 @@ static void test_same_bits(void** state)
 {
     (void)state;
     enum { COUNT = 200 };
-    static float first[3 * COUNT], result[3 * COUNT];
-    bool have = false;
-    for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
-        if (!(es_isa_available_mask() >> isa & 1)) continue;
-        for (uint32_t threads = 1; threads <= 3; threads += 2) {
-            room r = {0};
-            es_context_desc desc = es_default_context_desc();
-            desc.threads = threads;
-            desc.isa_mask = 1u << isa;
-            assert_int_equal(es_context_create(&desc, &r.w.context), ES_OK);
-            assert_int_equal(es_world_create(r.w.context, NULL, &r.w.world), ES_OK);
-            const es_material_desc one = lambert(0, 1), two = lambert(0, 5);
-            add_rectangle(&r.w, es_v3(-1, 1, -1), es_v3(2, 0, 0), es_v3(0, 0, 2), &one);
-            add_sphere(&r.w, es_v3(0.3f, 0, 0.2f), 0.3f, 12, false, &two);
-            bring(&r, 1 << 12);
-            es_gather_point points[COUNT];
-            for (uint32_t i = 0; i < COUNT; i++) {
-                points[i] = floor_point(0.01f * (float)i - 1, 0.004f * (float)(i % 37), i);
-                points[i].kind = i % 3 ? ES_GATHER_DIFFUSE : ES_GATHER_LOBE;
-                points[i].model = i % 2 ? ES_SURFACE_PHONG : ES_SURFACE_METALLIC_ROUGHNESS;
-                points[i].roughness = i % 2 ? 20 : 0.3f;
-                for (int k = 0; k < 3; k++) points[i].f0[k] = 0.5f;
-            }
-            es_micro_settings s = usual();
-            s.size = 12;
-            gather(&r, &s, points, COUNT, result);
-            if (!have) memcpy(first, result, sizeof first);
-            have = true;
-            assert_memory_equal(first, result, sizeof first);
-            leave(&r);
+    static float result[3 * COUNT];
+    same_bits same = {.most_threads = 3};
+    for (es_context* context; (context = next_context(&same));) {
+        room r = {.w.context = context};
+        assert_int_equal(es_world_create(context, NULL, &r.w.world), ES_OK);
+        const es_material_desc one = lambert(0, 1), two = lambert(0, 5);
+        add_rectangle(&r.w, es_v3(-1, 1, -1), es_v3(2, 0, 0), es_v3(0, 0, 2), &one);
+        add_sphere(&r.w, es_v3(0.3f, 0, 0.2f), 0.3f, 12, false, &two);
+        bring(&r, 1 << 12);
+        es_gather_point points[COUNT];
+        for (uint32_t i = 0; i < COUNT; i++) {
+            points[i] = floor_point(0.01f * (float)i - 1, 0.004f * (float)(i % 37), i);
+            points[i].kind = i % 3 ? ES_GATHER_DIFFUSE : ES_GATHER_LOBE;
+            points[i].model = i % 2 ? ES_SURFACE_PHONG : ES_SURFACE_METALLIC_ROUGHNESS;
+            points[i].roughness = i % 2 ? 20 : 0.3f;
+            for (int k = 0; k < 3; k++) points[i].f0[k] = 0.5f;
         }
+        es_micro_settings s = usual();
+        s.size = 12;
+        gather(&r, &s, points, COUNT, result);
+        expect_same_bits(&same, result, sizeof result);
+        leave(&r);
     }
 }
 

@@ -13,11 +13,13 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "tests/races.h"
+#include "tests/same_bits.h"
+#include "tests/small_worlds.h"
 
 #if defined(__SANITIZE_THREAD__)
-enum { WIDTH = 22, HEIGHT = 14, POINTS = 256, VARIANTS = 1 };
+enum { WIDTH = 22, HEIGHT = 14, POINTS = 256, VARIANTS = 1, DEFAULT_POINTS = 1024 };
 #else
-enum { WIDTH = 42, HEIGHT = 30, POINTS = 1024, VARIANTS = 4 };
+enum { WIDTH = 42, HEIGHT = 30, POINTS = 1024, VARIANTS = 4, DEFAULT_POINTS = 16384 };
 #endif
 
 typedef struct stage { es_context* context; es_world* world; es_renderer* renderer; es_renderer_settings settings; } stage;
@@ -210,6 +212,114 @@ static void test_two_renderers(void** state)
     render(&s);
     assert_true(all_of(&s) == first_hash && all_of(&second) == second_hash);
     es_renderer_destroy(second.renderer);
+    close_stage(&s);
+}
+
+/* ---- as it is by default ------------------------------------------------------------------------------------------------------ */
+
+/* A polished ball and a polished dish in a closed box with a lamp: they throw its light on walls, and reflect each other. */
+static small_world polished_world(es_context* context)
+{
+    small_world w = {.context = context};
+    assert_int_equal(es_world_create(context, NULL, &w.world), ES_OK);
+    const es_material_desc walls = lambert(0.6f, 0);
+    es_material_desc metal = es_default_material_desc();
+    metal.metallic = 1;
+    metal.roughness = 0.15f;
+    metal.base_color[1] = 0.7f;
+    add_closed_box(&w, &walls);
+    add_sphere(&w, es_v3(-0.35f, -0.6f, -0.2f), 0.4f, 12, false, &metal);
+    add_sphere(&w, es_v3(0.5f, -0.8f, 0), 0.2f, 8, false, &metal);
+    es_light_desc lamp = es_default_light_desc();
+    lamp.type = ES_LIGHT_POINT;
+    lamp.intensity = 6;
+    add_light(&w, lamp, es_v3(0.4f, 0.6f, 0.3f), es_v3(0, -1, 0));
+    look(&w, es_default_camera_desc(), es_v3(0.1f, 0.1f, 0.98f), es_v3(0, -0.4f, 0));
+    return w;
+}
+
+static es_renderer_settings default_settings(void)
+{
+    const es_renderer_settings d = es_default_renderer_settings();
+    es_renderer_settings s = small_settings(d.micro_spacing);
+    s.micro_size = d.micro_size;
+    s.micro_points = DEFAULT_POINTS;
+    assert_true(s.micro_share > 0 && s.micro_lobes && s.micro_warp && s.micro_ray_cast);
+    return s;
+}
+
+static stage open_polished(es_context* context, const es_renderer_settings* settings)
+{
+    stage s = {.context = context, .world = polished_world(context).world, .settings = *settings};
+    assert_int_equal(es_renderer_create(context, settings, &s.renderer), ES_OK);
+    return s;
+}
+
+static void assert_light(const es_image* image)
+{
+    double sum = 0;
+    for (size_t i = 0; i < (size_t)image->width * image->height * image->channels; i++) {
+        assert_true(isfinite(image->pixels[i]) && image->pixels[i] >= 0.0f);
+        sum += (double)image->pixels[i];
+    }
+    assert_true(sum > 0);
+}
+
+/* The same bits on one thread and several, on every instruction set, and where all work is done again; no light is negative, or no number. */
+static void test_same_bits_by_default(void** state)
+{
+    (void)state;
+    static const char* const names[] = {"irradiance", "indirect", "display"};
+    es_renderer_settings settings = default_settings();
+    settings.width = WIDTH * 3 / 4;
+    settings.height = HEIGHT * 3 / 4;
+    settings.micro_points = 2 * POINTS;
+    same_bits same = {.most_threads = 3};
+    for (es_context* context; (context = next_context(&same));) {
+        stage s = open_polished(context, &settings);
+        render(&s);
+        for (int k = 0; k < 3; k++) {
+            es_image image = image_of(&s, names[k]);
+            assert_light(&image);
+            expect_same_bits(&same, image.pixels, (size_t)image.width * image.height * image.channels * sizeof(float));
+            es_image_destroy(context, &image);
+        }
+        const uint64_t hash = all_of(&s);
+        s.settings.skip = false;
+        configure(&s);
+        render(&s);
+        assert_true(all_of(&s) == hash);
+        close_stage(&s);
+    }
+}
+
+/* What cells share is nearly what each point sees for itself, also where curved metal throws light about. The bounds are for what another seed changes as well, and for
+ * cells that are wide in so small a picture; a block of pixels that sees something else, or a wall that takes another's light, is beyond them. */
+static void test_shared_by_default(void** state)
+{
+    (void)state;
+    es_renderer_settings settings = default_settings();
+    es_context_desc desc = es_default_context_desc();
+    desc.threads = 2;
+    es_context* context;
+    assert_int_equal(es_context_create(&desc, &context), ES_OK);
+    stage s = open_polished(context, &settings);
+    render(&s);
+    es_image shared = image_of(&s, "irradiance");
+    s.settings.micro_share = 0;
+    configure(&s);
+    render(&s);
+    es_image own = image_of(&s, "irradiance");
+    double off = 0, all = 0, sum = 0;
+    for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) {
+        off += fabs((double)shared.pixels[i] - (double)own.pixels[i]);
+        all += (double)shared.pixels[i];
+        sum += (double)own.pixels[i];
+    }
+    print_message("irradiance: shared off by %.4f, mean %.4f\n", off / sum, all / sum);
+    assert_true(sum > 0 && off < 0.08 * sum && fabs(all - sum) < 0.04 * sum);
+    es_image_destroy(context, &shared);
+    es_image_destroy(context, &own);
     close_stage(&s);
 }
 
@@ -461,6 +571,8 @@ int main(void)
         cmocka_unit_test(test_same_bits),
         unit_test_without_races(test_switching),
         unit_test_without_races(test_two_renderers),
+        cmocka_unit_test(test_same_bits_by_default),
+        unit_test_without_races(test_shared_by_default),
         unit_test_without_races(test_interpolation),
         unit_test_without_races(test_settles),
         unit_test_without_races(test_bounces),

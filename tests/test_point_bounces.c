@@ -15,6 +15,7 @@
 #include "raster/points.h"
 #include "tests/guarded_planes.h"
 #include "tests/hand_forest.h"
+#include "tests/same_bits.h"
 #include "tests/small_worlds.h"
 
 static const double pi = 3.14159265358979324;
@@ -272,38 +273,28 @@ static void test_same_bits(void** state)
     }
     for (size_t i = 0; i < (size_t)VPLS * SIZE * SIZE; i++) maps[i] = es_random_u32(71, counter++) % 2 ? ES_PARABOLIC_EMPTY : (uint16_t)(es_random_u32(71, counter++) % ES_PARABOLIC_DEPTH_MAX);
     const es_shade_job job = {.vpls = vpls, .vpl_count = VPLS, .maps = maps, .map_size = SIZE, .far_distance = 20, .bias = 0.01f, .slope_bias = 0.01f, .spread = 1, .geometry_bound = 10};
-    const size_t bytes = f.node_count * sizeof(float);
-    float* expected = NULL;
-    for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
-        if (!(es_isa_available_mask() >> isa & 1)) continue;
-        for (uint32_t threads = 1; threads <= 3; threads++) {
-            es_context* context = open_context(threads, 1u << isa);
-            es_arena arena;
-            es_arena_init(&arena, context, 1 << 16);
-            plane planes[3];
-            float* kept[3];
-            for (int k = 0; k < 3; k++) {
-                planes[k] = new_plane(f.node_count);
-                kept[k] = f.radiance[k];
-                f.radiance[k] = at(planes[k]);
-                for (size_t i = 0; i < f.node_count; i++) f.radiance[k][i] = 0.5f;
-            }
-            assert_int_equal(es_points_light_vpls(context, &arena, &f, &job, 8, &lobes), ES_OK);
-            if (!expected) {
-                expected = malloc(3 * bytes);
-                for (int k = 0; k < 3; k++) memcpy(expected + (size_t)k * f.node_count, f.radiance[k], bytes);
-            }
-            for (int k = 0; k < 3; k++) {
-                check_guards(planes[k]);
-                assert_memory_equal(f.radiance[k], expected + (size_t)k * f.node_count, bytes);
-                f.radiance[k] = kept[k];
-                free(planes[k].memory);
-            }
-            es_arena_free(&arena);
-            es_context_destroy(context);
+    same_bits same = {.most_threads = 3};
+    for (es_context* context; (context = next_context(&same));) {
+        es_arena arena;
+        es_arena_init(&arena, context, 1 << 16);
+        plane planes[3];
+        float* kept[3];
+        for (int k = 0; k < 3; k++) {
+            planes[k] = new_plane(f.node_count);
+            kept[k] = f.radiance[k];
+            f.radiance[k] = at(planes[k]);
+            for (size_t i = 0; i < f.node_count; i++) f.radiance[k][i] = 0.5f;
         }
+        assert_int_equal(es_points_light_vpls(context, &arena, &f, &job, 8, &lobes), ES_OK);
+        for (int k = 0; k < 3; k++) {
+            check_guards(planes[k]);
+            expect_same_bits(&same, f.radiance[k], f.node_count * sizeof(float));
+            f.radiance[k] = kept[k];
+            free(planes[k].memory);
+        }
+        es_arena_free(&arena);
+        es_context_destroy(context);
     }
-    free(expected);
     free(maps);
     hand_forest_free(&f);
 }

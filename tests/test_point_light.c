@@ -16,6 +16,7 @@
 #include "tests/guarded_planes.h"
 #include "tests/hand_forest.h"
 #include "tests/lit_worlds.h"
+#include "tests/same_bits.h"
 #include "tests/surface_in_double.h"
 
 static es_lobe_albedo lobes;
@@ -266,42 +267,28 @@ static void test_same_bits(void** state)
     for (uint32_t taps = 1; taps <= 4; taps++) {
         job.shadow_filter = taps;
         job.emission = taps != 2;
-        float* expected = NULL;
-        const size_t bytes = f.node_count * sizeof(float);
-        for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
-            if (!(es_isa_available_mask() >> isa & 1)) continue;
-            for (uint32_t threads = 1; threads <= 3; threads++) {
-                es_context_desc desc = es_default_context_desc();
-                desc.threads = threads;
-                desc.isa_mask = 1u << isa;
-                es_context* context;
-                assert_int_equal(es_context_create(&desc, &context), ES_OK);
-                plane planes[3];
-                float* kept[3];
-                for (int k = 0; k < 3; k++) {
-                    planes[k] = new_plane(f.node_count);
-                    kept[k] = f.radiance[k];
-                    f.radiance[k] = at(planes[k]);
-                    for (size_t i = 0; i < f.node_count; i++) f.radiance[k][i] = -1;
-                }
-                assert_int_equal(es_points_light_direct(context, &f, &job), ES_OK);
-                if (!expected) {
-                    expected = malloc(3 * bytes);
-                    for (int k = 0; k < 3; k++) memcpy(expected + (size_t)k * f.node_count, f.radiance[k], bytes);
-                    size_t written = 0;
-                    for (size_t i = 0; i < f.node_count; i++) written += expected[i] != -1;
-                    assert_int_equal(written, f.leaf_count); /* and no inner node */
-                }
-                for (int k = 0; k < 3; k++) {
-                    check_guards(planes[k]);
-                    assert_memory_equal(f.radiance[k], expected + (size_t)k * f.node_count, bytes);
-                    f.radiance[k] = kept[k];
-                    free(planes[k].memory);
-                }
-                es_context_destroy(context);
+        same_bits same = {.most_threads = 3};
+        for (es_context* context; (context = next_context(&same));) {
+            plane planes[3];
+            float* kept[3];
+            for (int k = 0; k < 3; k++) {
+                planes[k] = new_plane(f.node_count);
+                kept[k] = f.radiance[k];
+                f.radiance[k] = at(planes[k]);
+                for (size_t i = 0; i < f.node_count; i++) f.radiance[k][i] = -1;
             }
+            assert_int_equal(es_points_light_direct(context, &f, &job), ES_OK);
+            size_t written = 0;
+            for (size_t i = 0; i < f.node_count; i++) written += f.radiance[0][i] != -1;
+            assert_int_equal(written, f.leaf_count); /* and no inner node */
+            for (int k = 0; k < 3; k++) {
+                check_guards(planes[k]);
+                expect_same_bits(&same, f.radiance[k], f.node_count * sizeof(float));
+                f.radiance[k] = kept[k];
+                free(planes[k].memory);
+            }
+            es_context_destroy(context);
         }
-        free(expected);
     }
     hand_forest_free(&f);
     lit_world_destroy(&l);

@@ -16,6 +16,7 @@
 #include "platform/context.h"
 #include "tests/hand_forest.h"
 #include "tests/lit_worlds.h"
+#include "tests/same_bits.h"
 #include "tests/surface_in_double.h"
 
 static es_lobe_albedo albedos;
@@ -290,34 +291,19 @@ static void test_same_bits(void** state)
     strip s = bent_strip(2048, 0.2f);
     es_point_forest* f = &s.forest;
     static es_gather_point points[SCREEN];
-    static float found[3 * SCREEN], expected[3 * SCREEN];
+    static float found[3 * SCREEN];
     const es_point_light_job job = job_of(&s.l, true);
-    const size_t bytes = f->node_count * sizeof *f->lobes;
-    es_point_lobe* lobes = NULL;
     screen_points(points);
-    for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
-        if (!(es_isa_available_mask() >> isa & 1)) continue;
-        for (uint32_t threads = 1; threads <= 2; threads++) {
-            es_context_desc desc = es_default_context_desc();
-            desc.threads = threads;
-            desc.isa_mask = 1u << isa;
-            es_context* context;
-            assert_int_equal(es_context_create(&desc, &context), ES_OK);
-            assert_int_equal(es_points_light_direct(context, f, &job), ES_OK);
-            es_forest_pull(context, f);
-            gather_screen(context, f, points, found);
-            if (!lobes) {
-                lobes = malloc(bytes);
-                memcpy(lobes, f->lobes, bytes);
-                memcpy(expected, found, sizeof found);
-            }
-            assert_memory_equal(f->lobes, lobes, bytes);
-            assert_memory_equal(found, expected, sizeof found);
-            es_forest_drop_lobes(context, f);
-            es_context_destroy(context);
-        }
+    same_bits same = {.most_threads = 2};
+    for (es_context* context; (context = next_context(&same));) {
+        assert_int_equal(es_points_light_direct(context, f, &job), ES_OK);
+        es_forest_pull(context, f);
+        gather_screen(context, f, points, found);
+        expect_same_bits(&same, f->lobes, f->node_count * sizeof *f->lobes);
+        expect_same_bits(&same, found, sizeof found);
+        es_forest_drop_lobes(context, f);
+        es_context_destroy(context);
     }
-    free(lobes);
     close_strip(&s);
 }
 

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "gi/micro/radiosity.h"
+#include "tests/same_bits.h"
 #include "tests/small_worlds.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -144,51 +145,33 @@ static void test_sphere(void** state)
 static void test_same_bits(void** state)
 {
     (void)state;
-    float* expected = NULL;
-    size_t nodes = 0;
-    for (int isa = 0; isa < ES_ISA_COUNT; isa++) {
-        if (!(es_isa_available_mask() >> isa & 1)) continue;
-        for (uint32_t threads = 1; threads <= 2; threads++) {
-            es_context_desc desc = es_default_context_desc();
-            desc.threads = threads;
-            desc.isa_mask = 1u << isa;
-            room r = {0};
-            assert_int_equal(es_context_create(&desc, &r.w.context), ES_OK);
-            assert_int_equal(es_world_create(r.w.context, NULL, &r.w.world), ES_OK);
-            es_material_desc m = lambert(0.7f, 1);
-            m.specular = 1;
-            m.roughness = 0.3f;
-            add_closed_box(&r.w, &m);
-            m.emission[0] = 9;
-            add_sphere(&r.w, es_v3(0.2f, -0.3f, 0), 0.4f, 8, false, &m);
-            const es_forest_request request = {.points = 2048, .rebuild = 1.5f};
-            es_forest_update update;
-            assert_int_equal(es_world_step(r.w.world, 0), ES_OK);
-            assert_int_equal(es_forest_bring(r.w.context, &r.forest, es_world_draw_list(r.w.world), 1, &request, &update), ES_OK);
-            es_arena_init(&r.arena, r.w.context, 1 << 20);
-            lobes.filled = false;
-            es_lobe_albedo_fill(r.w.context, &lobes);
-            glow(&r);
-            es_radiosity_job job = job_of(2);
-            job.level = 6;
-            job.micro.size = 8;
-            assert_int_equal(es_points_light_radiosity(r.w.context, &r.arena, &r.forest, &job, NULL), ES_OK);
-            es_forest_pull(r.w.context, &r.forest);
-            if (!expected) {
-                nodes = r.forest.node_count;
-                expected = malloc(3 * nodes * sizeof(float));
-                for (int k = 0; k < 3; k++) memcpy(expected + (size_t)k * nodes, r.forest.radiance[k], nodes * sizeof(float));
-            }
-            assert_int_equal(r.forest.node_count, nodes);
-            for (uint32_t t = 0; t < r.forest.tree_count; t++)
-                for (int k = 0; k < 3; k++) {
-                    const size_t first = r.forest.trees[t].first + 1;
-                    assert_memory_equal(r.forest.radiance[k] + first, expected + (size_t)k * nodes + first, (2 * r.forest.trees[t].leaf_count - 1) * sizeof(float));
-                }
-            leave(&r);
-        }
+    same_bits same = {.most_threads = 2};
+    for (es_context* context; (context = next_context(&same));) {
+        room r = {.w.context = context};
+        assert_int_equal(es_world_create(context, NULL, &r.w.world), ES_OK);
+        es_material_desc m = lambert(0.7f, 1);
+        m.specular = 1;
+        m.roughness = 0.3f;
+        add_closed_box(&r.w, &m);
+        m.emission[0] = 9;
+        add_sphere(&r.w, es_v3(0.2f, -0.3f, 0), 0.4f, 8, false, &m);
+        const es_forest_request request = {.points = 2048, .rebuild = 1.5f};
+        es_forest_update update;
+        assert_int_equal(es_world_step(r.w.world, 0), ES_OK);
+        assert_int_equal(es_forest_bring(context, &r.forest, es_world_draw_list(r.w.world), 1, &request, &update), ES_OK);
+        es_arena_init(&r.arena, context, 1 << 20);
+        lobes.filled = false;
+        es_lobe_albedo_fill(context, &lobes);
+        glow(&r);
+        es_radiosity_job job = job_of(2);
+        job.level = 6;
+        job.micro.size = 8;
+        assert_int_equal(es_points_light_radiosity(context, &r.arena, &r.forest, &job, NULL), ES_OK);
+        es_forest_pull(context, &r.forest);
+        for (uint32_t t = 0; t < r.forest.tree_count; t++)
+            for (int k = 0; k < 3; k++) expect_same_bits(&same, r.forest.radiance[k] + r.forest.trees[t].first + 1, (2 * r.forest.trees[t].leaf_count - 1) * sizeof(float));
+        leave(&r);
     }
-    free(expected);
 }
 
 static void test_little(void** state)
