@@ -142,8 +142,8 @@ typedef struct es_renderer_settings {
      * ES_MICRO_LIGHT_VPLS */
     uint32_t micro_size;             /* pixels of a micro-buffer's side, 8 … 32, a multiple of 4 (thesis: 24) */
     uint32_t micro_points;           /* of the whole scene, at most; each tree has a power of two */
-    uint32_t micro_spacing;          /* 1, 2, 4: light is gathered at every so manieth pixel of every so manieth row, and interpolated along surfaces, what
-                                      * lobes reflect at every second at the most; pixels without neighbours on their surface have it gathered (§6.2.4) */
+    uint32_t micro_spacing;          /* 1, 2, 4: light is gathered at every so manieth pixel of every so manieth row, and interpolated along surfaces; what
+                                      * lobes reflect at every second at least; pixels without neighbours on their surface have it gathered (§6.2.4) */
     float micro_cut;                 /* a node is drawn, not opened, when its sphere's solid angle is at most this share of that of a pixel above the surface,
                                       * pi / micro_size²; of a lobe's pixel, there; what is shared is as with 4 at the most */
     float micro_share;               /* what is further than so many radii of a cell of up to 64 gather points is drawn once, from the cell's middle, and looked up by each of
@@ -152,7 +152,7 @@ typedef struct es_renderer_settings {
                                       * gaps; gaps between nodes are closed. Of what is distributed as a lobe is, only what is shared */
     uint32_t micro_filter;           /* with micro_spacing 1: diffuse light goes through the geometry-aware filter of that size, filter_passes times: its noise is that of
                                       * places in pixels, and neighbours have others; 1: not */
-    bool micro_ray_cast;             /* points larger than a pixel are met by rays; off: drawn as one pixel */
+    bool micro_ray_cast;             /* points larger than micro_cut allows are met by rays; off: they are drawn as others are, and leave holes */
     bool micro_warp;                 /* a pixel is a direction of the lobe's importance; off: of the cosine's, weighted by the lobe */
     bool micro_lobes;                /* what lobes of the points reflect of the lights goes where it goes, as a distribution of its own; off: evenly into their hemisphere */
     uint32_t micro_nodes;            /* es_micro_nodes */
