@@ -263,8 +263,15 @@ static void darken_result(const sweep* w, uint32_t y)
     for (uint32_t k = 3; k < 6; k++) memset(job->result[k] + (size_t)y * job->gbuffer->stride + w->x0, 0, columns * sizeof(float));
 }
 
+/* gcc would make copies of it for the first eight passes, of which there are two or three: ten times the code, and the time to compile it. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define ES_ONE_BODY __attribute__((noclone, noinline))
+#else
+#define ES_ONE_BODY
+#endif
+
 /* Line y of what pass p reads has come: makes the lines whose windows it completes. */
-static void pass_line(sweep* w, uint32_t p, uint32_t y)
+static ES_ONE_BODY void pass_line(sweep* w, uint32_t p, uint32_t y)
 {
     const es_filter_job* job = w->job;
     const bool lobes = w->planes == 6;
