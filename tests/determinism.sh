@@ -1,6 +1,9 @@
 #!/usr/bin/env bash
-# The same frames, bit for bit: every image of frame_hashes for 1, 2, 3 and 8 threads on every instruction set at hand, and
+# The same frames, bit for bit: every image of frame_hashes on every instruction set at hand and for 1, 2, 3 and 8 threads, and
 # without skipping, against one thread of scalar code.
+#
+# Threads share out the same tasks whatever the instruction set, so every number of them is tried with the best one alone; a kernel that
+# reaches into a neighbour's task shows as soon as tasks run beside each other, so each other one is tried with the most.
 #
 # usage: determinism.sh BUILD_DIR SOURCE_DIR           this build alone
 #        determinism.sh BUILD_DIR SOURCE_DIR matrix    builds by gcc -O1, clang -O1 and clang -O3 without the optional libraries,
@@ -19,47 +22,64 @@ rm -rf "$results"
 mkdir -p "$results"
 compared=0
 different=0
-reference=$work/reference.txt
+reference=$results/reference.lines
+names=() scenes_of=() unbuilt=() # by the comparison's number
 skipped_one=
 
-# compare NAME COMMAND…: the command's lines against the reference's. As many run side by side as there are processors; what each found
-# lies in results/NUMBER, empty when nothing differs, and collect prints it in their order.
+# start NUMBER COMMAND…: its lines into results/NUMBER.lines. As many run side by side as there are processors.
+start()
+{
+    local number=$1
+    shift
+    while [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; do wait -n; done
+    { "$@" >"$results/$number.running" 2>"$results/$number.errors" && mv "$results/$number.running" "$results/$number.lines"; } &
+}
+
+# compare NAME COMMAND…: the command's lines against the reference's, once collect has both: it prints what differs in this order.
 compare()
 {
-    local name=$1 number=$compared
+    names[compared]=$1
+    scenes_of[compared]=$scenes
     shift
+    start "$compared" "$@"
     compared=$((compared + 1))
-    while [ "$(jobs -rp | wc -l)" -ge "$(nproc)" ]; do wait -n; done
-    {
-        local lines=$results/$number.lines
-        if ! "$@" >"$lines" 2>"$results/$number.errors"; then
-            echo "FAILED: $name: $(tail -n 1 "$results/$number.errors")"
-        elif ! grep -E "^(${scenes// /|}) " "$reference" | cmp -s - "$lines"; then
-            echo "FAILED: $name differs in (scene frame image):"
-            grep -E "^(${scenes// /|}) " "$reference" | diff - "$lines" | sed -n 's/^> \(.*\) [0-9a-f]*$/    \1/p' | head -n 12
-        fi
-    } >"$results/$number.running" && mv "$results/$number.running" "$results/$number" &
 }
 
 collect()
 {
     wait
-    local number
+    local number expected=$results/expected.txt
+    if [ ! -f "$reference" ]; then
+        echo "FAILED: frame_hashes itself: $(tail -n 1 "$results/reference.errors")"
+        exit 1
+    fi
     for ((number = 0; number < compared; number++)); do
-        [ -f "$results/$number" ] || echo "FAILED: comparison $number did not end" >"$results/$number"
-        [ -s "$results/$number" ] || continue
+        if [ -n "${unbuilt[number]:-}" ]; then
+            echo "FAILED: ${unbuilt[number]}"
+        elif ! grep -E "^(${scenes_of[number]// /|}) " "$reference" >"$expected"; then
+            echo "FAILED: ${names[number]}: the reference has none of these scenes: ${scenes_of[number]}"
+        elif [ ! -f "$results/$number.lines" ]; then
+            echo "FAILED: ${names[number]}: $(tail -n 1 "$results/$number.errors")"
+        elif ! cmp -s "$expected" "$results/$number.lines"; then
+            echo "FAILED: ${names[number]} differs in (scene frame image):"
+            diff "$expected" "$results/$number.lines" | sed -n 's/^> \(.*\) [0-9a-f]*$/    \1/p' | head -n 12
+        else
+            continue
+        fi
         different=$((different + 1))
-        cat "$results/$number"
     done
 }
 
-# every_way NAME PROGRAM THREADS…: all instruction sets with each of the numbers of threads, then without skipping
+# every_way NAME PROGRAM THREADS…: the best instruction set with each of the numbers of threads, the others with the last of them, then without
+# skipping
 every_way()
 {
-    local name=$1 program=$2 isa threads
+    local name=$1 program=$2 isa best threads
     shift 2
+    best=$($program --isas | tail -n 1)
     for isa in $($program --isas); do
         for threads in "$@"; do
+            [ "$isa" = "$best" ] || [ "$threads" = "${!#}" ] || continue
             # shellcheck disable=SC2086
             compare "$name, $isa, $threads threads" $program --isa $isa --threads $threads $scenes
         done
@@ -76,7 +96,7 @@ configure_and_build()
     if ! cmake -S "$source" -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DEARTHSHINE_TESTS=ON -DEARTHSHINE_DEMOS=OFF \
         -DEARTHSHINE_WITH_OPENEXR=OFF -DEARTHSHINE_WITH_PNG=OFF -DEARTHSHINE_WITH_GLFW=OFF -DEARTHSHINE_WITH_TINYGLTF=OFF \
         "$@" >"$folder.log" 2>&1 || ! cmake --build "$folder" --target frame_hashes >>"$folder.log" 2>&1; then
-        echo "FAILED: the build in $folder: $(grep -m 1 -E 'error:|undefined reference|CMake Error' "$folder.log" || tail -n 1 "$folder.log")" >"$results/$compared"
+        unbuilt[compared]="the build in $folder: $(grep -m 1 -E 'error:|undefined reference|CMake Error' "$folder.log" || tail -n 1 "$folder.log")"
         compared=$((compared + 1))
         return 1
     fi
@@ -84,10 +104,7 @@ configure_and_build()
 
 scenes=$("$build/frame_hashes" --scenes)
 # shellcheck disable=SC2086
-if ! "$build/frame_hashes" --isa scalar --threads 1 $scenes >"$reference"; then
-    echo "FAILED: frame_hashes itself"
-    exit 1
-fi
+start reference "$build/frame_hashes" --isa scalar --threads 1 $scenes
 
 if [ -z "$matrix" ]; then
     every_way "this build" "$build/frame_hashes" 1 2 3 8
@@ -109,7 +126,7 @@ else
         done
     done
 
-    # An emulated processor is some thirty times slower: three scenes at most, each way once.
+    # An emulated processor is some thirty times slower: three scenes, each once by the best kernels, and one of them without skipping.
     if command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null; then
         folder=$work/aarch64
         if configure_and_build "$folder" -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
@@ -117,8 +134,8 @@ else
             program="qemu-aarch64 -L /usr/aarch64-linux-gnu $folder/frame_hashes"
             # shellcheck disable=SC2086
             for isa in $($program --isas); do
-                scenes="cornell parts cornell-stack" threads=3
-                [ "$isa" = scalar ] && scenes="parts cornell-stack" threads=1
+                scenes="parts cornell-stack" threads=3
+                [ "$isa" = scalar ] && threads=1
                 compare "aarch64, $isa, $threads threads" $program --isa $isa --threads $threads $scenes
             done
             scenes="cornell cornell-stack"
