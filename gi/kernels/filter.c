@@ -64,13 +64,15 @@ static uint32_t makes_to(const sweep* w, uint32_t p)
 static void fold(const sweep* w, uint32_t p, float* line, float nothing)
 {
     const int64_t from = w->left + reads_from(w, p), to = w->left + reads_to(w, p), width = w->job->gbuffer->width, n = w->job->size;
-    for (int64_t x = from < 0 ? from : width > from ? width : from; x < to; x++) {
-        if (x == 0) x = width; /* the left side is done */
-        if (x >= to) break;
-        const int64_t place = folded(x, width, n);
-        /* -1 is no place, though it may lie within the block's margin */
-        line[x - w->left] = place >= 0 && place >= from && place < to ? line[place - w->left] : nothing;
-    }
+    /* the left side, the right side, and beyond it, where nothing folds to the image */
+    const int64_t begin[2] = {from, from > width ? from : width}, end[2] = {to < 0 ? to : 0, to < width + n ? to : width + n};
+    for (int side = 0; side < 2; side++)
+        for (int64_t x = begin[side]; x < end[side]; x++) {
+            const int64_t place = folded(x, width, n);
+            /* -1 is no place, though it may lie within the block's margin */
+            line[x - w->left] = place >= 0 && place >= from && place < to ? line[place - w->left] : nothing;
+        }
+    for (int64_t x = from > width + n ? from : width + n; x < to; x++) line[x - w->left] = nothing;
 }
 
 /* Lobes are rare: where planes 3 … 5 of a line's taps are all zero, so are their means. */

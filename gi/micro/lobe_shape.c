@@ -52,8 +52,19 @@ static float apart(es_vec3 a, es_vec3 b)
     return 0.5f * es_v3_dot(d, d);
 }
 
+/* Directions about an axis, of which every other ring of samples is turned by half a step. */
+typedef struct around { float sine[2][AROUND], cosine[2][AROUND]; } around;
+
+static around turn_around(void)
+{
+    around a;
+    for (int turned = 0; turned < 2; turned++)
+        for (int j = 0; j < AROUND; j++) es_sincos(2.0f * ES_PI * ((float)j + 0.5f * (float)(1 + turned)) / AROUND, &a.sine[turned][j], &a.cosine[turned][j]);
+    return a;
+}
+
 /* Sets its gain; returns the square of its distance from the model less what does not depend on it. */
-static float distance(bool phong, const drawn* model, shape* s)
+static float distance(bool phong, const drawn* model, const around* turns, shape* s)
 {
     es_vec3 t, b;
     float kept = 0.0f, square = 0.0f, common = 0.0f;
@@ -62,9 +73,7 @@ static float distance(bool phong, const drawn* model, shape* s)
         /* closer towards the rim: what is below the horizon is mostly there */
         const float left = ((float)i + 0.5f) / ACROSS, weight = 2.0f * left / (ACROSS * AROUND), x = within(phong, s->a, 1.0f - left * left), z = 1.0f - x, r = es_sqrt(es_maxf(x * (2.0f - x), 0.0f)), p = density(phong, s->a, x);
         for (int j = 0; j < AROUND; j++) {
-            float sine, cosine;
-            es_sincos(2.0f * ES_PI * ((float)j + 0.5f * (float)(1 + i % 2)) / AROUND, &sine, &cosine);
-            const float c = s->mu.z * z + (t.z * cosine + b.z * sine) * r, share = es_clampf(c * (1.0f / ES_LOBE_HORIZON), 0.0f, 1.0f);
+            const float c = s->mu.z * z + (t.z * turns->cosine[i % 2][j] + b.z * turns->sine[i % 2][j]) * r, share = es_clampf(c * (1.0f / ES_LOBE_HORIZON), 0.0f, 1.0f);
             kept += weight * share;
             square += weight * p * share * share;
         }
@@ -76,14 +85,14 @@ static float distance(bool phong, const drawn* model, shape* s)
 }
 
 /* The best width about mu, by golden section over its logarithm. */
-static float widen(bool phong, const drawn* model, float typical, shape* s)
+static float widen(bool phong, const drawn* model, const around* turns, float typical, shape* s)
 {
     const float ratio = 0.618033989f;
     float low = es_log2(es_maxf(typical * 0.2f, ES_LOBE_LEAST_WIDTH)), high = es_log2(es_minf(typical * 12.0f, 1.0f));
     float x[2] = {high - ratio * (high - low), low + ratio * (high - low)}, at[2];
     for (int k = 0; k < 2; k++) {
         s->a = es_exp2(x[k]);
-        at[k] = distance(phong, model, s);
+        at[k] = distance(phong, model, turns, s);
     }
     for (int i = 0; i < STEPS; i++) {
         const int next = at[0] < at[1] ? 0 : 1;
@@ -99,14 +108,14 @@ static float widen(bool phong, const drawn* model, float typical, shape* s)
             x[1] = low + ratio * (high - low);
         }
         s->a = es_exp2(x[next]);
-        at[next] = distance(phong, model, s);
+        at[next] = distance(phong, model, turns, s);
     }
     s->a = es_exp2(at[0] < at[1] ? x[0] : x[1]);
-    return distance(phong, model, s);
+    return distance(phong, model, turns, s);
 }
 
 /* Between the mean direction of what is reflected and the mirror direction. */
-static shape fit(bool phong, const es_surface* s, float c, float own)
+static shape fit(bool phong, const es_surface* s, float c, float own, const around* turns)
 {
     enum { DIRECTIONS = 4 };
     /* a lobe that wide has no other peak than its mean */
@@ -123,7 +132,7 @@ static shape fit(bool phong, const es_surface* s, float c, float own)
     float least = 3e38f;
     for (int i = 0; i < directions; i++) {
         shape here = {.mu = es_v3_normalize(es_v3_add(es_v3_scale(mean, (float)(DIRECTIONS - 1 - i)), es_v3_scale(mirror, (float)i)), mirror)};
-        const float found = widen(phong, &model, typical, &here);
+        const float found = widen(phong, &model, turns, typical, &here);
         if (!(found < least)) continue;
         least = found;
         best = here;
@@ -134,6 +143,7 @@ static shape fit(bool phong, const es_surface* s, float c, float own)
 static void rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     es_lobe_shapes* shapes = user;
+    const around turns = turn_around();
     (void)worker;
     for (uint32_t row = begin; row < end; row++)
         for (int phong = 0; phong < 2; phong++)
@@ -142,7 +152,7 @@ static void rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
                 const float share = (float)row / (ES_SHAPE_ROWS - 1), roughness = phong ? ES_SHAPE_MAX_EXPONENT * share * share : share, c = es_maxf((float)column / (ES_SHAPE_COLUMNS - 1), 0.02f);
                 const es_surface s = {.specular = es_v3(1, 1, 1), .roughness = roughness, .model = phong ? ES_SURFACE_PHONG : ES_SURFACE_METALLIC_ROUGHNESS};
                 const float own = phong ? 0.5f / (roughness + 1.0f) : es_maxf(roughness * roughness * roughness * roughness, ES_SURFACE_MIN_ALPHA2);
-                const shape found = fit(phong, &s, c, own);
+                const shape found = fit(phong, &s, c, own, &turns);
                 const float sine = es_sqrt(1.0f - c * c);
                 shapes->lean[phong][at] = sine > 0.0f ? -found.mu.x / sine : 1.0f;
                 shapes->lift[phong][at] = found.mu.z - c;
