@@ -20,16 +20,7 @@ fail()
 }
 
 floors="platform raster sim gi"
-rank()
-{
-    case $1 in
-    platform) echo 0 ;;
-    raster) echo 1 ;;
-    sim) echo 2 ;;
-    gi) echo 3 ;;
-    *) echo 9 ;;
-    esac
-}
+declare -A rank=([platform]=0 [raster]=1 [sim]=2 [gi]=3) # of whatever else: 9
 
 # ---- text -------------------------------------------------------------------------------------------------------------
 
@@ -62,18 +53,19 @@ declare -A only_in=(
     ['^zlib\.h$']=platform/image_exr_dwa.c
     ['^(tiny_gltf|stb_.*|json)\.(h|hpp)$|^nlohmann/.*']=sim/import_gltf.cpp
 )
+include='^[[:space:]]*#[[:space:]]*include[[:space:]]*[<"]([^>"]+)[>"]'
 while IFS=: read -r file line text; do
-    floor=${file%%/*}
-    name=$(sed -E 's/^[[:space:]]*#[[:space:]]*include[[:space:]]*[<"]([^>"]+)[>"].*/\1/' <<<"$text")
+    floor=${file%%/*} name=$text
+    [[ $text =~ $include ]] && name=${BASH_REMATCH[1]}
     from_floor=
     case $name in
-    earthshine/*) from_floor=$(basename "$name" .h) ;;
+    earthshine/*) from_floor=${name#earthshine/} from_floor=${from_floor%.h} ;;
     platform/* | raster/* | sim/* | gi/* | demos/* | tests/*) from_floor=${name%%/*} ;;
     esac
     case $floor in
     platform | raster | sim | gi)
         if [ -n "$from_floor" ]; then
-            [ "$(rank "$from_floor")" -le "$(rank "$floor")" ] || fail "$file:$line: $floor/ must not include $name: a floor includes only floors below"
+            [ "${rank[$from_floor]:-9}" -le "${rank[$floor]:-9}" ] || fail "$file:$line: $floor/ must not include $name: a floor includes only floors below"
             continue
         fi
         ;;
