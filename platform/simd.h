@@ -340,6 +340,37 @@ VINL void vf_transpose8(vf v[8])
         }
 #endif
 }
+/* How lanes come together: those of a mask's bits, in their order. */
+typedef struct v_packing {
+#if defined(ES_SIMD_256)
+    vi places; /* within each half */
+    uint32_t in_low;
+#else
+    uint32_t bits;
+#endif
+} v_packing;
+VINL v_packing v_packing_of(uint32_t bits)
+{
+#if defined(ES_SIMD_256)
+    static const int32_t places[16][4] = {{0}, {0}, {1}, {0, 1}, {2}, {0, 2}, {1, 2}, {0, 1, 2}, {3}, {0, 3}, {1, 3}, {0, 1, 3}, {2, 3}, {0, 2, 3}, {1, 2, 3}, {0, 1, 2, 3}};
+    const uint32_t low = bits & 15, high = bits >> 4;
+    return (v_packing){(vi)_mm256_loadu2_m128i((const __m128i*)places[high], (const __m128i*)places[low]), (uint32_t)__builtin_popcount(low)};
+#else
+    return (v_packing){bits};
+#endif
+}
+/* The lanes at p, one after another; up to the eighth place behind them holds anything then. */
+VINL void vf_store_packed(float* p, vf a, v_packing packing)
+{
+#if defined(ES_SIMD_256)
+    const __m256 halves = _mm256_permutevar_ps((__m256)a, (__m256i)packing.places);
+    _mm_storeu_ps(p, _mm256_castps256_ps128(halves));
+    _mm_storeu_ps(p + packing.in_low, _mm256_extractf128_ps(halves, 1));
+#else
+    for (uint32_t bits = packing.bits; bits; bits &= bits - 1) *p++ = a[__builtin_ctz(bits)];
+#endif
+}
+VINL void vi_store_packed(void* p, vi a, v_packing packing) { vf_store_packed(p, vf_from_bits(a), packing); }
 /* Of the sixteen lanes of a and b, in order, those at even and those at odd places. */
 VINL void vf_deinterleave(vf a, vf b, vf* even, vf* odd)
 {

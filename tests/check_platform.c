@@ -1234,6 +1234,8 @@ static void test_simd_operations(void** state)
             float sum = (s0 + s2) + (s1 + s3);
             uint32_t got = result[(size_t)ES_SIMD_vf_sum * COUNT + i];
             assert_true(got == to_bits(sum) || (sum != sum && is_nan_bits(got)));
+            for (int lane = 0, packed = 0; lane < 8; lane++)
+                if (bits >> lane & 1) assert_int_equal(result[(size_t)ES_SIMD_vf_store_packed * COUNT + i + packed++], to_bits(c[i + lane]));
             for (int lane = 0; lane < 8; lane++) {
                 uint32_t index = to_bits(b[i + lane]) >> 3 & 15;
                 assert_int_equal(result[(size_t)ES_SIMD_vf_gather * COUNT + i + lane], to_bits(a[index]));

@@ -97,5 +97,9 @@ void ES_KERNEL(es_platform_simd_operations)(const float* pa, const float* pb, co
         PUT(vf_store3_1, vf_load(stored + VW));
         PUT(vf_store3_2, vf_load(stored + 2 * VW));
         PUT(vf_store3_3, vf_load(stored + 3 * VW));
+        const uint32_t bits = vm_bits(vm_lt(a, b));
+        vf_store_packed(stored, c, v_packing_of(bits));
+        for (int k = __builtin_popcount(bits); k < VW; k++) stored[k] = 0.0f;
+        PUT(vf_store_packed, vf_load(stored));
     }
 }
