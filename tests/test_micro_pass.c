@@ -305,21 +305,25 @@ static void test_shared_by_default(void** state)
     assert_int_equal(es_context_create(&desc, &context), ES_OK);
     stage s = open_polished(context, &settings);
     render(&s);
-    es_image shared = image_of(&s, "irradiance");
+    es_image shared = image_of(&s, "irradiance"), shared_light = image_of(&s, "indirect"), metal = image_of(&s, "metallic");
     s.settings.micro_share = 0;
     configure(&s);
     render(&s);
-    es_image own = image_of(&s, "irradiance");
-    double off = 0, all = 0, sum = 0;
+    es_image own = image_of(&s, "irradiance"), own_light = image_of(&s, "indirect");
+    double off = 0, all = 0, sum = 0, metal_off = 0, metal_sum = 0;
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT * 3; i++) {
         off += fabs((double)shared.pixels[i] - (double)own.pixels[i]);
         all += (double)shared.pixels[i];
         sum += (double)own.pixels[i];
+        if (!(metal.pixels[i / 3 * metal.channels] > 0)) continue;
+        metal_off += fabs((double)shared_light.pixels[i] - (double)own_light.pixels[i]);
+        metal_sum += (double)own_light.pixels[i];
     }
-    print_message("irradiance: shared off by %.4f, mean %.4f\n", off / sum, all / sum);
+    print_message("shared: irradiance off by %.4f, mean %.4f; light of metal off by %.4f\n", off / sum, all / sum, metal_off / metal_sum);
     assert_true(sum > 0 && off < 0.08 * sum && fabs(all - sum) < 0.04 * sum);
-    es_image_destroy(context, &shared);
-    es_image_destroy(context, &own);
+    assert_true(metal_sum > 0 && metal_off < 0.12 * metal_sum);
+    es_image* const images[] = {&shared, &shared_light, &metal, &own, &own_light};
+    for (int i = 0; i < 5; i++) es_image_destroy(context, images[i]);
     close_stage(&s);
 }
 
