@@ -3,7 +3,7 @@
  * at a time, a lane each, from a cut that they share (micro_cut_simd.h). Then each looks up its rays in the pictures of its cells: a pixel keeps the nearest.
  *
  * Of what points draw for themselves, a node whose sphere would cover a pixel more than the cut allows is opened; others are drawn into the pixel whose ray is
- * nearest, if a disc of their area covers that, or, of lobes, into the pixel of their centre (micro_map_simd.h). Of cosine-distributed pixels the measure is the
+ * nearest, if a disc of their area covers that. Of cosine-distributed pixels the measure is the
  * sphere's angle on the disc before foreshortening, (r / d)², against cut / size²: near the horizon pixels are long and narrow, and by their solid angle nodes
  * would be drawn that are wider than the pixel, and leave holes beside it. Of lobes it is that angle times the density.
  *
@@ -23,16 +23,24 @@
 /* Radii within which a disc is taken for the surface that it lies on, when it faces the same way. */
 #define OWN_SURFACE 2.0f
 
+/* Radians from a lobe's ray within which a node may lie that does not cover it: the pixels of lobes are drawn-out, and the shorter their sides the more gaps would be
+ * left. */
+#define NARROW 0.05f
+
 static int32_t* pixels_of(es_micro_scratch* s, uint32_t lane) { return s->words[lane] + ES_MICRO_MARGIN; }
 
 /* Nodes [first, end) of the cut, into one pixel each. In three short loops: what the lanes see, where that falls, and the pixels. In one loop the chain of
- * roots and divisions is longer than what a processor keeps in flight. Lanes that do not see a node get EMPTY, which is never nearer. */
+ * roots and divisions is longer than what a processor keeps in flight. Lanes that do not see a node get EMPTY, which is never nearer, and so do those whose
+ * pixel's ray is not within the node's area, seen as a disc: otherwise all that is seen would grow by half a pixel, and where pixels are wide, at the horizon and
+ * in the tails of lobes, what is low would hide what is above it. */
 VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lanes* here, uint32_t first, uint32_t end, vm wanted, bool lobe)
 {
     enum { RUN = 32 };
     const es_micro_table* table = job->table;
     const es_micro_cut* cut = &s->cut;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
+    /* others repeat the first one's */
+    const vi lane_rays = (wanted & vi_iota()) * vi_set1((int32_t)(sizeof s->lobes[0] / sizeof(float)));
     vf across[RUN], along[RUN], up[RUN], area[RUN];
     int32_t at[RUN][VW], key[RUN][VW];
     for (uint32_t begin = first; begin < end; begin += RUN) {
@@ -53,15 +61,16 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
         for (uint32_t j = 0; j < count; j++) {
             vf u, v;
             if (lobe) {
-                vi_store(at[j], lobe_pixel(table, here, s, across[j], along[j], up[j]));
+                const vi pixel = lobe_pixel(table, here, s, across[j], along[j], up[j]), ray = lane_rays + pixel;
+                const vf x = vf_gather(s->lobes[0].at[0], ray) - across[j], y = vf_gather(s->lobes[0].at[1], ray) - along[j], z = vf_gather(s->lobes[0].at[2], ray) - up[j];
+                vi_store(at[j], pixel);
+                vi_store(key[j], vi_select(vm_le(x * x + y * y + z * z, vf_max(area[j], vf_set1(NARROW * NARROW))), vi_load(key[j]), vi_set1(EMPTY)));
                 continue;
             }
             const vf rho = vf_sqrt(across[j] * across[j] + along[j] * along[j]);
             square_of(across[j], along[j], rho, &u, &v);
             vf off_across, off_along;
             vi_store(at[j], pixel_of(table, here, u, v, &off_across, &off_along));
-            /* is the pixel's ray within the node's area, seen as a disc? Otherwise all that is seen would grow by half a pixel, and at the horizon, where pixels
-             * are high, what is low would hide what is above it */
             const vf z2 = up[j] * up[j] + vf_set1(0.25f) * area[j];
             vi_store(key[j], vi_select(vm_le(off_across + off_along * z2, area[j] * z2), vi_load(key[j]), vi_set1(EMPTY)));
         }
@@ -121,7 +130,7 @@ static void cast_cosine(const es_micro_job* job, const es_micro_rays* rays, cons
 }
 
 /* Eight rays are left out when their cone and the disc's sphere do not meet. */
-static void cast_lobe(const es_micro_job* job, const es_micro_scratch* s, const disc* d, float r, int32_t* pixels)
+static void cast_lobe(const es_micro_job* job, const es_micro_lobe_rays* rays, const disc* d, float r, int32_t* pixels)
 {
     const es_micro_table* table = job->table;
     const vf one = vf_set1(1.0f), zero = vf_zero();
@@ -129,14 +138,14 @@ static void cast_lobe(const es_micro_job* job, const es_micro_scratch* s, const 
     const float sine = es_minf(r * inverse, 1.0f), cosine = es_sqrt(1.0f - sine * sine);
     const uint32_t chunks = table->stride / VW * table->size;
     for (uint32_t first = 0; first < chunks; first += VW) {
-        const vf cone = vf_load(s->chunk_cosine + first), cone_sine = vf_sqrt(vf_max(one - cone * cone, zero));
-        const vf between = (vf_load(s->chunk_axis[0] + first) * d->c[0] + vf_load(s->chunk_axis[1] + first) * d->c[1] + vf_load(s->chunk_axis[2] + first) * d->c[2]) * vf_set1(inverse);
+        const vf cone = vf_load(rays->cosine + first), cone_sine = vf_sqrt(vf_max(one - cone * cone, zero));
+        const vf between = (vf_load(rays->axis[0] + first) * d->c[0] + vf_load(rays->axis[1] + first) * d->c[1] + vf_load(rays->axis[2] + first) * d->c[2]) * vf_set1(inverse);
         const vf limit = cone * vf_set1(cosine) - cone_sine * vf_set1(sine);
         uint32_t bits = r * inverse >= 1.0f ? 0xffu : vm_bits(vm_ge(between, limit - vf_set1(1e-5f)));
         if (chunks - first < VW) bits &= (1u << (chunks - first)) - 1;
         for (; bits; bits &= bits - 1) {
             const uint32_t at = (first + (uint32_t)__builtin_ctz(bits)) * VW;
-            cast_chunk(d, vf_load(s->rays[0] + at), vf_load(s->rays[1] + at), vf_load(s->rays[2] + at), job->inverse_square, pixels + at);
+            cast_chunk(d, vf_load(rays->at[0] + at), vf_load(rays->at[1] + at), vf_load(rays->at[2] + at), job->inverse_square, pixels + at);
         }
     }
 }
@@ -188,11 +197,10 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
     }
     for (; any; any &= any - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(any);
-        if (lobe) lobe_rays(job->table, here, lane, s);
         for (uint32_t i = cut->near; i < ES_MICRO_MAX_CUT; i++) {
             if (!(s->cast[i] >> lane & 1)) continue;
             const disc disc = disc_in_axes(cut, here, lane, i);
-            if (lobe) cast_lobe(job, s, &disc, cut->nodes[i].r, pixels_of(s, lane));
+            if (lobe) cast_lobe(job, &s->lobes[lane], &disc, cut->nodes[i].r, pixels_of(s, lane));
             else cast_cosine(job, &job->table->rays[jitters[lane]], &disc, cut->nodes[i].r, pixels_of(s, lane));
         }
     }
@@ -263,14 +271,13 @@ static void keep_picture(const es_micro_job* job, es_micro_scratch* s, const es_
 {
     const es_micro_table* table = job->table;
     const bool lobe = here->mapping != ES_MICRO_COSINE;
-    if (lobe) lobe_rays(table, here, lane, s);
     for (uint32_t y = 0; y < table->size; y++)
         for (uint32_t x = 0; x < table->size; x++) {
             const int32_t word = pixels_of(s, lane)[y * table->stride + x];
             es_micro_pixel* pixel = &job->picture[y * table->size + x];
             *pixel = (es_micro_pixel){.node = UINT32_MAX};
             const uint32_t at = y * table->stride + x;
-            const float dx = lobe ? s->rays[0][at] : rays->x[at], dy = lobe ? s->rays[1][at] : rays->y[at], dz = lobe ? s->rays[2][at] : rays->z[at];
+            const float dx = lobe ? s->lobes[lane].at[0][at] : rays->x[at], dy = lobe ? s->lobes[lane].at[1][at] : rays->y[at], dz = lobe ? s->lobes[lane].at[2][at] : rays->z[at];
             for (int k = 0; k < 3; k++) pixel->direction[k] = here->t[k][lane] * dx + here->b[k][lane] * dy + here->a[k][lane] * dz;
             if (word == EMPTY) continue;
             const vi bits = vi_set1(((word >> 16) + DEPTH_BASE + 32768) << 13);
@@ -353,10 +360,10 @@ static unwarped unwarped_of(const es_gather_point* point, const lanes* l, uint32
 static void look_up(const es_micro_job* job, es_micro_scratch* s, const common* common, const lanes* here, uint32_t lane, const es_micro_rays* rays)
 {
     const bool lobe = here->mapping != ES_MICRO_COSINE;
-    if (lobe) lobe_rays(job->table, here, lane, s);
     for (; common; common = common->outer) {
         if (common->end == common->first) continue;
-        onlooker o = {.near = common->near};
+        onlooker o = {.near = common->near, .far = common->outer ? 2.5f * common->outer->near : 1.0f / es_sqrt(job->inverse_square)};
+        float square = 0.0f;
         for (int i = 0; i < 3; i++) {
             const float* axis = common->axes[i];
             o.offset[i] = o.turn[i][0] = o.turn[i][1] = o.turn[i][2] = 0.0f;
@@ -366,8 +373,11 @@ static void look_up(const es_micro_job* job, es_micro_scratch* s, const common* 
                 o.turn[i][1] += axis[k] * here->b[k][lane];
                 o.turn[i][2] += axis[k] * here->a[k][lane];
             }
+            square += o.offset[i] * o.offset[i];
         }
-        const float* const towards[3] = {lobe ? s->rays[0] : rays->x, lobe ? s->rays[1] : rays->y, lobe ? s->rays[2] : rays->z};
+        /* the further from the middle, the further apart is what a ray may meet, seen from there */
+        o.looks = 2 + (int)es_minf(8.0f * es_sqrt(square) / es_maxf(o.near, 1e-18f) + 0.999f, common->outer ? 2.0f : 3.0f);
+        const float* const towards[3] = {lobe ? s->lobes[lane].at[0] : rays->x, lobe ? s->lobes[lane].at[1] : rays->y, lobe ? s->lobes[lane].at[2] : rays->z};
         if (common->layout.zoomed) look_at_far(job, &s->panoramas[common->level], &common->layout, &o, towards, pixels_of(s, lane));
         else {
             layout plain = common->layout;
@@ -390,7 +400,10 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
         for (int k = 0; k < 2; k++) here.shift[k][i] = table->rays[jitters[i]].shift[k];
     }
     const uint32_t begin = common ? common->end : 0;
-    if (mapping != ES_MICRO_COSINE) tabulate_lobe(table, &here, s);
+    if (mapping != ES_MICRO_COSINE) {
+        tabulate_lobe(table, &here, s);
+        for (uint32_t i = 0; i < count; i++) find_lobe_rays(table, &here, i, s);
+    }
     if (s->cut.count > begin) draw_small(job, s, &here, begin, s->cut.count, vm_first((int32_t)count));
     if (s->cut.near < ES_MICRO_MAX_CUT) draw_near(job, s, &here, jitters, open, (1u << count) - 1);
     for (uint32_t i = 0; i < count; i++) {
@@ -407,8 +420,9 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
     s->stats.samples += (uint64_t)count * table->size * table->size;
 }
 
-/* The zoom with which a panorama's texels in the middle of the sharpest lobe are as dense as that lobe's pixels: size² k² / 4 of them a steradian where there are
- * 2 size texels a side, as to size² times the density, which is `bound` / pi at its largest (lane_bound). */
+/* The zoom with which a panorama's texels in the middle of the sharpest lobe are half as dense a side as that lobe's pixels: size² k² / 4 of them a steradian where
+ * there are 2 size texels a side, as to size² times the density, which is `bound` / pi at its largest (lane_bound). With as many, tails would have texels of a
+ * third of a radian, in which what lies at the horizon is smeared. */
 static float zoom_of(const es_micro_job* job, uint32_t first, uint32_t count)
 {
     float most = 1.0f;
@@ -416,7 +430,7 @@ static float zoom_of(const es_micro_job* job, uint32_t first, uint32_t count)
         const es_gather_point* point = &job->points[job->order[first + i]];
         const float sharpness = es_micro_sharpness(point), nv = es_micro_view_cosine(point);
         const float bound = point->model == ES_SURFACE_PHONG ? 0.5f * (sharpness + 1.0f) : 0.5f / ((nv + es_sqrt(sharpness + (1.0f - sharpness) * nv * nv)) * sharpness);
-        most = es_maxf(most, es_sqrt(bound * (4.0f / 3.14159265f)));
+        most = es_maxf(most, 0.5f * es_sqrt(bound * (4.0f / 3.14159265f)));
     }
     return most;
 }

@@ -103,8 +103,8 @@ VINL vm classify(const cell* cell, const nodes_v* v, float open, vm* opened, vf*
         const vf inverse = one / vf_max(d, vf_set1(1e-15f)), sine = (v->r + r) * inverse;
         /* however many spheres they lie in, there is an end to opening them */
         inside = vm_ge(sine, one) & vm_gt(v->r * v->r, vf_set1(open * 1e-3f) * square);
-        if (cell->mirror_cosine > -2.0f)
-            measure = measure * lobe_bound(cell, (vf_set1(cell->mirror[0]) * dx + vf_set1(cell->mirror[1]) * dy + vf_set1(cell->mirror[2]) * dz) * inverse, vf_min(sine, one));
+        if (cell->mirror_cosine <= -2.0f) measure = measure * lobe_bound(cell, one, zero); /* towards everything, as it is where it is largest */
+        else measure = measure * lobe_bound(cell, (vf_set1(cell->mirror[0]) * dx + vf_set1(cell->mirror[1]) * dy + vf_set1(cell->mirror[2]) * dz) * inverse, vf_min(sine, one));
     }
     *opened = inside | vm_gt(measure, vf_set1(open) * square);
     *excess = vf_select(inside, vf_set1(2.0f), measure / vf_max(vf_set1(open) * square, vf_set1(1e-18f)));

@@ -236,10 +236,11 @@ static lanes lane_alone(const lanes* l, uint32_t lane)
     return one;
 }
 
-/* The rays through one lane's pixels, in its axes, and cones about each eight of them. What a cell at the horizon sends below it is bent up to it. */
-static void lobe_rays(const es_micro_table* table, const lanes* l, uint32_t lane, es_micro_scratch* s)
+/* Of one lane. What a cell at the horizon sends below it is bent up to it. */
+static void find_lobe_rays(const es_micro_table* table, const lanes* l, uint32_t lane, es_micro_scratch* s)
 {
     const lanes alone = lane_alone(l, lane);
+    es_micro_lobe_rays* rays = &s->lobes[lane];
     const uint32_t size = table->size;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
     const float share = 1.0f / (float)size;
@@ -247,15 +248,15 @@ static void lobe_rays(const es_micro_table* table, const lanes* l, uint32_t lane
         const float u = table_place(&s->marginal[0][lane], ((float)column + 0.5f + l->shift[0][lane]) * share, &across);
         const uint32_t cell = (uint32_t)es_clampf((u + 1.0f) * (0.5f * ES_MICRO_GRID), 0.0f, ES_MICRO_GRID - 1);
         for (uint32_t row = 0, along = 0; row < size; row++) {
-            s->rays[0][row * table->stride + column] = u;
-            s->rays[1][row * table->stride + column] = table_place(&s->conditional[cell][0][lane], ((float)row + 0.5f + l->shift[1][lane]) * share, &along);
+            rays->at[0][row * table->stride + column] = u;
+            rays->at[1][row * table->stride + column] = table_place(&s->conditional[cell][0][lane], ((float)row + 0.5f + l->shift[1][lane]) * share, &along);
         }
         for (uint32_t pad = size; column + 1 == size && pad < table->stride; pad++)
-            for (uint32_t row = 0; row < size; row++) s->rays[0][row * table->stride + pad] = u, s->rays[1][row * table->stride + pad] = s->rays[1][row * table->stride + column];
+            for (uint32_t row = 0; row < size; row++) rays->at[0][row * table->stride + pad] = u, rays->at[1][row * table->stride + pad] = rays->at[1][row * table->stride + column];
     }
     for (uint32_t at = 0; at < table->stride * size; at += VW) {
         vf a, b, x, y, z;
-        disc_of_square(vf_load(s->rays[0] + at), vf_load(s->rays[1] + at), &a, &b);
+        disc_of_square(vf_load(rays->at[0] + at), vf_load(rays->at[1] + at), &a, &b);
         lobe_from_disc(&alone, a, b, &x, &y, &z);
         const vf height = alone.normal_t * x + alone.normal_b * y + alone.normal_a * z, lift = vf_max(vf_set1(2e-3f) - height, zero);
         x = x + lift * alone.normal_t;
@@ -265,17 +266,17 @@ static void lobe_rays(const es_micro_table* table, const lanes* l, uint32_t lane
         x = x * scale;
         y = y * scale;
         z = z * scale;
-        vf_store(s->rays[0] + at, x);
-        vf_store(s->rays[1] + at, y);
-        vf_store(s->rays[2] + at, z);
+        vf_store(rays->at[0] + at, x);
+        vf_store(rays->at[1] + at, y);
+        vf_store(rays->at[2] + at, z);
         const float mx = vf_sum(x), my = vf_sum(y), mz = vf_sum(z), inverse = 1.0f / es_sqrt(es_maxf(mx * mx + my * my + mz * mz, 1e-30f));
         const vf cosines = x * vf_set1(mx * inverse) + y * vf_set1(my * inverse) + z * vf_set1(mz * inverse);
         float least = cosines[0];
         for (int i = 1; i < VW; i++) least = es_minf(least, cosines[i]);
-        s->chunk_axis[0][at / VW] = mx * inverse;
-        s->chunk_axis[1][at / VW] = my * inverse;
-        s->chunk_axis[2][at / VW] = mz * inverse;
-        s->chunk_cosine[at / VW] = es_minf(least - 1e-6f, 1.0f);
+        rays->axis[0][at / VW] = mx * inverse;
+        rays->axis[1][at / VW] = my * inverse;
+        rays->axis[2][at / VW] = mz * inverse;
+        rays->cosine[at / VW] = es_minf(least - 1e-6f, 1.0f);
     }
 }
 

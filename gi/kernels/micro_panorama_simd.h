@@ -2,10 +2,10 @@
  * as well (Ritschel §6.3.1); here they share what comes after it. What is nearer than some of the cell's radii is left to smaller cells, which are parts of it and
  * draw pictures of their own of what they were left, and in the end to each point.
  *
- * A point looks along each of its rays into the pictures. It guesses that what it sees is as far as what it saw by the ray beside it; where that is, seen from the
- * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). Where a look finds nothing, what is
- * left out may be in the way, and the next one is to where that ends; what it finds counts if it is about there. What a look has found holds: what is near is
- * nearer in any case.
+ * A point looks along each of its rays into the pictures. It guesses that what it sees is as far as what it saw by the ray above; where that is, seen from the
+ * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). What a look finds counts if it is
+ * about as far as the look was: otherwise it is seen past an edge, from the middle but not from the point. A look that finds nothing of that kind is followed by one
+ * at where what is left out ends, and by others further and further away: a guess from infinity may see what the ray passes by.
  *
  * The picture is a map of directions (x, y, z), z along the cell's axis, in one chart or two. First the sphere is turned into itself by the conformal map that
  * multiplies tan(θ/2) by k: of a direction of length ρ
@@ -206,6 +206,10 @@ static void cast_far(const es_micro_job* job, es_micro_canvas* p, const layout* 
         }
 }
 
+/* The largest radius of a node that is drawn, over its distance: of a wider one too much that lies below a point's horizon would be drawn above it where texels are
+ * wide, as those that are far from a lobe's direction are. */
+#define WIDEST_NODE 0.25f
+
 typedef struct far_finder {
     const es_micro_job* job;
     es_micro_scratch* s;
@@ -271,11 +275,17 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             /* radius / d times growth(), across */
             vf wide = vf_max(d + vf_set1(0.5f) * z, vf_set1(0.5f) * d);
             if (f->layout.zoomed) {
-                const vf near = d + z, far = vf_set1(f->layout.zoom * f->layout.zoom) * (d - z), up = near - far;
+                vf finest = z;
+                if (f->layout.zoom > 1.0f) { /* where it grows most of all that the sphere may cover: the middle of a wide node may be far from where the map is fine */
+                    const vf inverse = one / vf_max(d, vf_set1(1e-30f)), sphere = vf_min(v.r * inverse, one), sphere_cosine = vf_sqrt(one - sphere * sphere);
+                    const vf cosine = z * inverse, sine = vf_sqrt(vf_max(one - cosine * cosine, zero));
+                    finest = d * vf_select(vm_ge(cosine, sphere_cosine), one, vf_min(cosine * sphere_cosine + sine * sphere, one));
+                }
+                const vf near = d + finest, far = vf_set1(f->layout.zoom * f->layout.zoom) * (d - finest), up = near - far;
                 wide = near + far + vf_set1(0.5f) * vf_abs(up);
                 wide = wide * vf_select(vm_lt(up, zero), vf_set1(f->behind), vf_set1(f->front));
             }
-            const vf most = vf_set1(f->open) * (wide * wide), square = v.r * v.r;
+            const vf most = vf_min(vf_set1(f->open) * (wide * wide), vf_set1(WIDEST_NODE * WIDEST_NODE) * d * d), square = v.r * v.r;
             const vm opened = vm_gt(square, most);
             const uint32_t leaves = vm_bits(leaf);
             uint32_t kept = vm_bits(seen & ~opened & ~close), down = vm_bits(seen & (opened | close)), large = trees ? 0 : down & leaves & ~vm_bits(close);
@@ -286,22 +296,17 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
                     f->full = true;
                     break;
                 }
-                float x[VW], y[VW], h[VW], size[VW];
+                const v_packing packing = v_packing_of(kept);
                 const vf inverse = one / vf_max(d, vf_set1(1e-30f));
-                vf_store(x, vf_set1(f->axes[0][0]) * dx + vf_set1(f->axes[0][1]) * dy + vf_set1(f->axes[0][2]) * dz);
-                vf_store(y, vf_set1(f->axes[1][0]) * dx + vf_set1(f->axes[1][1]) * dy + vf_set1(f->axes[1][2]) * dz);
-                vf_store(h, z);
+                vf_store_packed(p->stage[0] + f->staged, vf_set1(f->axes[0][0]) * dx + vf_set1(f->axes[0][1]) * dy + vf_set1(f->axes[0][2]) * dz, packing);
+                vf_store_packed(p->stage[1] + f->staged, vf_set1(f->axes[1][0]) * dx + vf_set1(f->axes[1][1]) * dy + vf_set1(f->axes[1][2]) * dz, packing);
+                vf_store_packed(p->stage[2] + f->staged, z, packing);
+                vf_store_packed(p->stage[3] + f->staged, vf_set1(f->job->settings.cover * 0.318309886f) * vf_gather(nodes.areas, at) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one), packing);
                 if (forest->lobes) put_middles(tree, v.c, kept, cut);
-                vf_store(size, vf_set1(f->job->settings.cover * 0.318309886f) * vf_gather(nodes.areas, at) * vf_min(vf_max(facing * inverse, vf_set1(0.05f)), one));
-                for (; kept; kept &= kept - 1) {
-                    const uint32_t k = (uint32_t)__builtin_ctz(kept), to = f->staged++, slot = cut->count++;
-                    p->stage[0][to] = x[k];
-                    p->stage[1][to] = y[k];
-                    p->stage[2][to] = h[k];
-                    p->stage[3][to] = size[k];
-                    cut->radiance[slot] = (uint32_t)v.radiance[k];
-                    cut->node[slot] = tree->first + wave[i + k];
-                }
+                vi_store_packed(cut->radiance + cut->count, v.radiance, packing);
+                vi_store_packed(cut->node + cut->count, at + vi_set1((int32_t)tree->first), packing);
+                f->staged += (uint32_t)__builtin_popcount(kept);
+                cut->count += (uint32_t)__builtin_popcount(kept);
                 if (f->staged > ES_MICRO_STAGE - VW) flush_far(f);
             }
             if (large && cut->count + VW > ES_MICRO_MAX_FAR) {
@@ -434,11 +439,12 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
 
 /* ---- looking ---------------------------------------------------------------------------------------------------------------------------- */
 
-/* At the most; the last is of those that have found nothing yet. */
-enum { LOOKS = 3 };
+/* From one look that has found nothing to the next, and within which what is found is as far as the look was. */
+#define FURTHER 1.5f
+#define AS_FAR 1.3f
 
-/* A point in the cell's axes, from its middle; columns of `turn` are the point's axes there. */
-typedef struct onlooker { float offset[3], turn[3][3], near; } onlooker;
+/* A point in the cell's axes, from its middle; columns of `turn` are the point's axes there. Looks go from `near` to `far`, metres, `looks` at the most. */
+typedef struct onlooker { float offset[3], turn[3][3], near, far; int looks; } onlooker;
 
 /* In rows of 8 n pixels. A row's eights go side by side: the way from a guess to a texel's word and on is one long chain of latencies. */
 VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, const layout* l, const onlooker* o, const float* const rays[3], uint32_t n, int32_t* pixels)
@@ -448,7 +454,7 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
     const uint32_t size = job->table->size;
     vf t[4], x[4], y[4], z[4], rho[4];
     vi at[4], word[4];
-    vm blind[4];
+    vm done[4];
     for (uint32_t i = 0; i < n; i++) t[i] = extent; /* as far as was seen one row above */
     for (uint32_t row = 0; row < size; row++) {
         for (uint32_t i = 0; i < n; i++) {
@@ -460,27 +466,28 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
         }
         for (uint32_t i = 0; i < n; i++) {
             word[i] = empty;
-            blind[i] = vi_zero();
+            done[i] = vi_zero();
         }
-        for (int look = 0; look < LOOKS; look++) {
-            if (look == LOOKS - 1) {
-                vm any = vi_zero();
-                for (uint32_t i = 0; i < n; i++) any = any | blind[i];
-                if (!vm_any(any)) break;
-            }
+        float next = o->near;
+        for (int look = 0; look < o->looks && (look < 2 || next < o->far * FURTHER); look++, next *= FURTHER) {
+            vm all = vm_all_lanes();
+            for (uint32_t i = 0; i < n; i++) all = all & done[i];
+            if (vm_all(all)) break;
             for (uint32_t i = 0; i < n; i++) {
+                if (vm_all(done[i])) continue;
                 const vf qx = vf_set1(o->offset[0]) + t[i] * x[i], qy = vf_set1(o->offset[1]) + t[i] * y[i], qz = vf_set1(o->offset[2]) + t[i] * z[i];
                 rho[i] = vf_sqrt(qx * qx + qy * qy + qz * qz);
                 at[i] = texel_of(l, p->stride, qx, qy, qz, rho[i]);
             }
             for (uint32_t i = 0; i < n; i++) {
+                if (vm_all(done[i])) continue;
                 const vi found = vi_gather(p->words, at[i]);
                 const vf distance = vf_sqrt(share_of(found)) * extent;
-                const vm is = ~vi_eq(found, empty), there = is & (~blind[i] | vm_lt(distance, vf_set1(2.0f) * rho[i]));
-                const vm wanted = look == LOOKS - 1 ? blind[i] : vm_all_lanes();
-                word[i] = vi_select(there & wanted, found, word[i]);
-                t[i] = vf_select(wanted, vf_select(is, vf_max(t[i] + distance - rho[i], zero), vf_set1(o->near)), t[i]);
-                blind[i] = ~there;
+                const vm is = ~vi_eq(found, empty), counts = is & vm_lt(distance, vf_set1(AS_FAR) * rho[i]) & vm_gt(distance, vf_set1(1.0f / AS_FAR) * rho[i]);
+                const vm better = look ? counts : is; /* the first is but a guess */
+                word[i] = vi_select(counts & ~done[i], found, word[i]);
+                t[i] = vf_select(done[i], t[i], vf_select(better, vf_max(t[i] + distance - rho[i], zero), vf_set1(next)));
+                done[i] = done[i] | counts;
             }
         }
         for (uint32_t i = 0; i < n; i++) {

@@ -113,6 +113,9 @@ typedef struct es_micro_canvas {
     float rays[3][ES_MICRO_PANORAMA];      /* through the texels, in the cell's axes; 0 where there is none */
 } es_micro_canvas;
 
+/* The rays through a lobe's pixels, in its point's axes, and cones about each eight of them. */
+typedef struct es_micro_lobe_rays { float at[3][ES_MICRO_PIXELS], axis[3][ES_MICRO_PIXELS / 8], cosine[ES_MICRO_PIXELS / 8]; } es_micro_lobe_rays;
+
 /* A worker's. */
 typedef struct es_micro_scratch {
     int32_t words[ES_MICRO_LANES][ES_MICRO_LANE]; /* depth << 16 | place in the cut (kernels/micro.c); pixels begin after the margin */
@@ -123,10 +126,9 @@ typedef struct es_micro_scratch {
     uint32_t wave[2][2 * ES_MICRO_MAX_CUT]; /* nodes of a tree's level that are looked at */
     uint32_t* trees;                       /* that the cell opens; as many as the forest has */
     uint8_t cast[ES_MICRO_MAX_CUT];        /* lanes in which a leaf is met by rays */
-    /* of lobes: running sums of the density over columns, and over rows of each column, a lane each; then one lane's rays */
+    /* of lobes: running sums of the density over columns, and over rows of each column, a lane each */
     float marginal[ES_MICRO_GRID + 1][ES_MICRO_LANES], conditional[ES_MICRO_GRID][ES_MICRO_GRID + 1][ES_MICRO_LANES];
-    float rays[3][ES_MICRO_PIXELS];
-    float chunk_axis[3][ES_MICRO_PIXELS / 8], chunk_cosine[ES_MICRO_PIXELS / 8]; /* cones about eight rays each */
+    es_micro_lobe_rays lobes[ES_MICRO_LANES];
     es_micro_stats stats;
 } es_micro_scratch;
 
