@@ -27,8 +27,8 @@ typedef struct es_gather_point {
 typedef struct es_micro_settings {
     uint32_t size;         /* of the micro-buffers, pixels a side, 8 … 32, a multiple of 4 */
     float cut;             /* a node is drawn, not opened, when its sphere's solid angle is at most this share of pi / size², or of a lobe's pixel there */
-    float cover;           /* cosine-distributed pixels: a node is drawn into the one whose ray is nearest to its centre, where a disc of so many times its area covers
-                            * that ray; lobes': into the pixel of its centre. Gaps are closed */
+    float cover;           /* a node is drawn into the pixel whose ray is nearest to its centre, where a disc of so many times its area covers that ray, or, of lobes, is within a
+                            * twentieth of a radian of it. Gaps are closed */
     float share;           /* what is further than this many radii of a cell of points is seen from the cell's middle, and looked up there; less than 1 is as 1; 0: each point sees for itself */
     bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn into one pixel */
     bool warp;             /* pixels are distributed as the lobe is; off: as the cosine, and weighted */
