@@ -149,7 +149,7 @@ typedef struct es_renderer_settings {
     float micro_share;               /* what is further than so many radii of a cell of up to 64 gather points is drawn once, from the cell's middle, and looked up by each of
                                       * them: more is slower and nearer to the truth; less than 1 is as 1; 0: each point draws all that it sees */
     float micro_cover;               /* it is drawn where a disc of so many times its area covers the ray through the pixel: with 1 things are as wide as they are, but have
-                                      * gaps; gaps between nodes are closed */
+                                      * gaps; gaps between nodes are closed. Of a lobe also where it is within a twentieth of a radian */
     uint32_t micro_filter;           /* with micro_spacing 1: diffuse light goes through the geometry-aware filter of that size, filter_passes times: its noise is that of
                                       * places in pixels, and neighbours have others; 1: not */
     bool micro_ray_cast;             /* points larger than micro_cut allows are met by rays; off: they are drawn as others are, and leave holes */

@@ -57,7 +57,7 @@ static const es_setting renderer_table[] = {
     {"micro.spacing", ES_SETTING_INT, "1", 1, 4, NULL, "light is gathered at every pixel, or every 2nd or 4th in each dimension: 1, 2 or 4; what lobes reflect at every 2nd at least", AT(micro_spacing)},
     {"micro.cut", ES_SETTING_FLOAT, "4", 0.01, 100, NULL, "largest solid angle of a node that is drawn and not opened, share of a pixel's; of what is shared 4 at the most", AT(micro_cut)},
     {"micro.share", ES_SETTING_FLOAT, "2", 0, 1000, NULL, "what is further than this many radii of a cell of gather points is drawn once for all of them (less than 1 is as 1); 0: each point sees for itself", AT(micro_share)},
-    {"micro.cover", ES_SETTING_FLOAT, "1.3", 0.1, 100, NULL, "a node is drawn where so many times its area covers the pixel's ray: less leaves gaps, more lets things grow", AT(micro_cover)},
+    {"micro.cover", ES_SETTING_FLOAT, "1.3", 0.1, 100, NULL, "a node is drawn where so many times its area covers the pixel's ray, or is within 0.05 rad of a lobe's: less leaves gaps, more lets things grow", AT(micro_cover)},
     {"micro.filter", ES_SETTING_INT, "3", 1, 16, NULL, "at every pixel: side of the geometry-aware filter of the diffuse light, filter.passes times; 1: none", AT(micro_filter)},
     {"micro.ray-cast", ES_SETTING_BOOL, "true", 0, 1, NULL, "points larger than micro.cut allows are met by rays; off: they are drawn as others are, and leave holes", AT(micro_ray_cast)},
     {"micro.warp", ES_SETTING_BOOL, "true", 0, 1, NULL, "a micro-buffer's pixels are distributed as the lobe is", AT(micro_warp)},

@@ -21,7 +21,7 @@
     X(vi_gather4_a, 1) X(vi_gather4_b, 1) X(vi_gather4_c, 1) X(vi_gather4_d, 1)                                  \
     X(vf_load4_a, 1) X(vf_load4_b, 1) X(vf_load4_c, 1) X(vf_load4_d, 1)                                          \
     X(vf_store4_0, 1) X(vf_store4_1, 1) X(vf_store4_2, 1) X(vf_store4_3, 1)                                      \
-    X(vf_store3_0, 1) X(vf_store3_1, 1) X(vf_store3_2, 1) X(vf_store3_3, 1) X(vf_store_packed, 1)
+    X(vf_store3_0, 1) X(vf_store3_1, 1) X(vf_store3_2, 1) X(vf_store3_3, 1) X(vf_store_packed, 1) X(vf_store_packed_behind, 1)
 
 enum {
 #define ES_SIMD_OPERATION_ENUM(name, exact) ES_SIMD_##name,

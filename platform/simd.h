@@ -359,7 +359,7 @@ VINL v_packing v_packing_of(uint32_t bits)
     return (v_packing){bits};
 #endif
 }
-/* The lanes at p, one after another; up to the eighth place behind them holds anything then. */
+/* The lanes at p, one after another; the rest of eight places there holds anything then. */
 VINL void vf_store_packed(float* p, vf a, v_packing packing)
 {
 #if defined(ES_SIMD_256)

@@ -1236,6 +1236,7 @@ static void test_simd_operations(void** state)
             assert_true(got == to_bits(sum) || (sum != sum && is_nan_bits(got)));
             for (int lane = 0, packed = 0; lane < 8; lane++)
                 if (bits >> lane & 1) assert_int_equal(result[(size_t)ES_SIMD_vf_store_packed * COUNT + i + packed++], to_bits(c[i + lane]));
+            for (int lane = 0; lane < 8; lane++) assert_int_equal(result[(size_t)ES_SIMD_vf_store_packed_behind * COUNT + i + lane], to_bits(a[i + lane]));
             for (int lane = 0; lane < 8; lane++) {
                 uint32_t index = to_bits(b[i + lane]) >> 3 & 15;
                 assert_int_equal(result[(size_t)ES_SIMD_vf_gather * COUNT + i + lane], to_bits(a[index]));

@@ -8,7 +8,7 @@
 # usage: determinism.sh BUILD_DIR SOURCE_DIR           this build alone
 #        determinism.sh BUILD_DIR SOURCE_DIR matrix    builds by gcc -O1, clang -O1 and clang -O3 without the optional libraries,
 #                                                      on 3 threads, and one for aarch64 under qemu-user, in BUILD_DIR/determinism; the
-#                                                      release build itself is gcc -O3, and is compared on every number of threads. The
+#                                                      release build itself is gcc -O3 (scalar and sse4 kernels -O2), and is compared on every number of threads. The
 #                                                      builds have the instruction sets that this processor runs, those by -O1 scalar code
 #                                                      and the best of them
 # Ends with "N compared, N different".
@@ -126,7 +126,7 @@ else
         done
     done
 
-    # An emulated processor is some thirty times slower: three scenes, each once by the best kernels, and one of them without skipping.
+    # An emulated processor is some thirty times slower: two scenes by each instruction set, a third without skipping.
     if command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null; then
         folder=$work/aarch64
         if configure_and_build "$folder" -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
@@ -138,7 +138,7 @@ else
                 [ "$isa" = scalar ] && threads=1
                 compare "aarch64, $isa, $threads threads" $program --isa $isa --threads $threads $scenes
             done
-            scenes="cornell cornell-stack"
+            scenes="cornell"
             # shellcheck disable=SC2086
             compare "aarch64, --no-skip" $program --no-skip $scenes
         fi

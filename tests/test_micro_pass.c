@@ -17,9 +17,9 @@
 #include "tests/small_worlds.h"
 
 #if defined(__SANITIZE_THREAD__)
-enum { WIDTH = 22, HEIGHT = 14, POINTS = 256, VARIANTS = 1, DEFAULT_POINTS = 1024 };
+enum { WIDTH = 22, HEIGHT = 14, POINTS = 256, VARIANTS = 1 };
 #else
-enum { WIDTH = 42, HEIGHT = 30, POINTS = 1024, VARIANTS = 4, DEFAULT_POINTS = 16384 };
+enum { WIDTH = 42, HEIGHT = 30, POINTS = 1024, VARIANTS = 4 };
 #endif
 
 typedef struct stage { es_context* context; es_world* world; es_renderer* renderer; es_renderer_settings settings; } stage;
@@ -217,7 +217,7 @@ static void test_two_renderers(void** state)
 
 /* ---- as it is by default ------------------------------------------------------------------------------------------------------ */
 
-/* A polished ball and a polished dish in a closed box with a lamp: they throw its light on walls, and reflect each other. */
+/* Two polished balls in a closed box with a lamp: they throw its light on walls, and reflect each other. */
 static small_world polished_world(es_context* context)
 {
     small_world w = {.context = context};
@@ -243,7 +243,7 @@ static es_renderer_settings default_settings(void)
     const es_renderer_settings d = es_default_renderer_settings();
     es_renderer_settings s = small_settings(d.micro_spacing);
     s.micro_size = d.micro_size;
-    s.micro_points = DEFAULT_POINTS;
+    s.micro_points = 16384;
     assert_true(s.micro_share > 0 && s.micro_lobes && s.micro_warp && s.micro_ray_cast);
     return s;
 }

@@ -3,9 +3,9 @@
  * at a time, a lane each, from a cut that they share (micro_cut_simd.h). Then each looks up its rays in the pictures of its cells: a pixel keeps the nearest.
  *
  * Of what points draw for themselves, a node whose sphere would cover a pixel more than the cut allows is opened; others are drawn into the pixel whose ray is
- * nearest, if a disc of their area covers that. Of cosine-distributed pixels the measure is the
- * sphere's angle on the disc before foreshortening, (r / d)², against cut / size²: near the horizon pixels are long and narrow, and by their solid angle nodes
- * would be drawn that are wider than the pixel, and leave holes beside it. Of lobes it is that angle times the density.
+ * nearest, if a disc of their area covers that, or, of lobes, is all but there (NARROW). Of cosine-distributed pixels the measure is the sphere's angle on the disc
+ * before foreshortening, (r / d)², against cut / size²: near the horizon pixels are long and narrow, and by their solid angle nodes would be drawn that are wider
+ * than the pixel, and leave holes beside it. Of lobes it is that angle times the density.
  *
  * Leaves that are still too large are discs, and met by rays through the pixels that they may cover (on-demand ray casting). Since a pixel keeps the nearest of
  * what comes in any order, they need not wait in a list until the rest is drawn.
@@ -39,7 +39,7 @@ VINL void draw_small_as(const es_micro_job* job, es_micro_scratch* s, const lane
     const es_micro_table* table = job->table;
     const es_micro_cut* cut = &s->cut;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
-    /* others repeat the first one's */
+    /* lanes that are not wanted read the first one's */
     const vi lane_rays = (wanted & vi_iota()) * vi_set1((int32_t)(sizeof s->lobes[0] / sizeof(float)));
     vf across[RUN], along[RUN], up[RUN], area[RUN];
     int32_t at[RUN][VW], key[RUN][VW];
@@ -170,7 +170,7 @@ static disc disc_in_axes(const es_micro_cut* cut, const lanes* here, uint32_t la
     return disc;
 }
 
-static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes* here, const uint32_t jitters[VW], float open, uint32_t bits)
+static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes* here, const uint32_t jitters[VW], float open, vm wanted)
 {
     const es_micro_cut* cut = &s->cut;
     const bool lobe = here->mapping != ES_MICRO_COSINE;
@@ -181,7 +181,7 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
         const vf facing = vf_neg(vf_set1(cut->nodes[i].axis[0]) * dx + vf_set1(cut->nodes[i].axis[1]) * dy + vf_set1(cut->nodes[i].axis[2]) * dz) - vf_sqrt(d2) * vf_set1(GRAZING);
         /* a disc that the point all but lies on, and that faces as it does, stands for the point's own surface, which bends less than the disc is wide */
         const vf alike = vf_max(here->n[0] * vf_set1(cut->nodes[i].axis[0]) + here->n[1] * vf_set1(cut->nodes[i].axis[1]) + here->n[2] * vf_set1(cut->nodes[i].axis[2]), vf_zero()), own = vf_set1(OWN_SURFACE) * alike * r;
-        const vm seen = vm_gt(z + r, vf_zero()) & vm_gt(facing, vf_zero()) & vm_ge(d2, own * own);
+        const vm seen = vm_gt(z + r, vf_zero()) & vm_gt(facing, vf_zero()) & vm_ge(d2, own * own) & wanted;
         vf measure = r * r;
         if (lobe) {
             const vf inverse = vf_set1(1.0f) / vf_sqrt(d2), x = (here->t[0] * dx + here->t[1] * dy + here->t[2] * dz) * inverse, up = (here->a[0] * dx + here->a[1] * dy + here->a[2] * dz) * inverse;
@@ -189,8 +189,8 @@ static void draw_near(const es_micro_job* job, es_micro_scratch* s, const lanes*
         }
         const vm large = vm_gt(measure, vf_set1(open) * d2) | vm_gt(r * r, d2);
         const vm met = job->settings.ray_cast ? seen & large : vi_zero();
-        const uint32_t cast = vm_bits(met) & bits;
-        if (vm_bits(seen & ~met) & bits) draw_small(job, s, here, i, i + 1, seen & ~met);
+        const uint32_t cast = vm_bits(met);
+        if (vm_any(seen & ~met)) draw_small(job, s, here, i, i + 1, seen & ~met);
         s->cast[i] = (uint8_t)cast;
         any |= cast;
         s->stats.cast += (uint32_t)__builtin_popcount(cast);
@@ -362,7 +362,7 @@ static void look_up(const es_micro_job* job, es_micro_scratch* s, const common* 
     const bool lobe = here->mapping != ES_MICRO_COSINE;
     for (; common; common = common->outer) {
         if (common->end == common->first) continue;
-        onlooker o = {.near = common->near, .far = common->outer ? 2.5f * common->outer->near : 1.0f / es_sqrt(job->inverse_square)};
+        onlooker o = {.near = common->near, .far = common->outer ? LEFT_WITHIN * common->outer->near : 1.0f / es_sqrt(job->inverse_square)};
         float square = 0.0f;
         for (int i = 0; i < 3; i++) {
             const float* axis = common->axes[i];
@@ -375,8 +375,7 @@ static void look_up(const es_micro_job* job, es_micro_scratch* s, const common* 
             }
             square += o.offset[i] * o.offset[i];
         }
-        /* the further from the middle, the further apart is what a ray may meet, seen from there */
-        o.looks = 2 + (int)es_minf(8.0f * es_sqrt(square) / es_maxf(o.near, 1e-18f) + 0.999f, common->outer ? 2.0f : 3.0f);
+        o.looks = looks_of(es_sqrt(square), o.near, !common->outer);
         const float* const towards[3] = {lobe ? s->lobes[lane].at[0] : rays->x, lobe ? s->lobes[lane].at[1] : rays->y, lobe ? s->lobes[lane].at[2] : rays->z};
         if (common->layout.zoomed) look_at_far(job, &s->panoramas[common->level], &common->layout, &o, towards, pixels_of(s, lane));
         else {
@@ -405,7 +404,7 @@ static void gather_eight(const es_micro_job* job, uint32_t first, uint32_t count
         for (uint32_t i = 0; i < count; i++) find_lobe_rays(table, &here, i, s);
     }
     if (s->cut.count > begin) draw_small(job, s, &here, begin, s->cut.count, vm_first((int32_t)count));
-    if (s->cut.near < ES_MICRO_MAX_CUT) draw_near(job, s, &here, jitters, open, (1u << count) - 1);
+    if (s->cut.near < ES_MICRO_MAX_CUT) draw_near(job, s, &here, jitters, open, vm_first((int32_t)count));
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t index = job->order[first + i];
         const es_gather_point* point = &job->points[index];

@@ -302,7 +302,7 @@ static uint32_t roots_of_tree(es_micro_scratch* s, const beginnings* roots, uint
     return count;
 }
 
-/* Behind the `first` nodes that the cut holds. False: there are more than `most` beyond these, or most_near. */
+/* Behind the `first` nodes that the cut holds, from `roots` on, or of all there is when NULL. False: there are more than `most` beyond these, or most_near. */
 static bool find_cut(const es_micro_job* job, const cell* world, float open, uint32_t most, uint32_t most_near, const beginnings* roots, uint32_t first, es_micro_scratch* s)
 {
     const es_point_forest* forest = job->forest;

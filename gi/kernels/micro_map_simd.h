@@ -51,10 +51,15 @@ VINL void disc_of_square(vf u, vf v, vf* a, vf* b)
 }
 
 /* In the order of memory. |u|, |v| may be 1 and a rounding more, which the scale takes back. */
-VINL vi pixel_at(const es_micro_table* table, vf u, vf v)
+/* Pixels from their rays: the one whose ray is nearest, of a place in [-1, 1]². */
+VINL vi pixel_at(const es_micro_table* table, const lanes* l, vf u, vf v, vf* off_u, vf* off_v)
 {
-    const vf half = vf_set1(0.5f * (float)table->size), scale = vf_set1(0.4999998f * (float)table->size);
-    return vi_truncate(vf_floor(v * scale + half) * vf_set1((float)table->stride) + (u * scale + half));
+    const float size = (float)table->size;
+    const vf half = vf_set1(0.5f * size), scale = vf_set1(0.4999998f * size), x = u * scale + half - l->shift[0], y = v * scale + half - l->shift[1];
+    const vf last = vf_set1(size - 1.0f), column = vf_min(vf_max(vf_floor(x), vf_zero()), last), row = vf_min(vf_max(vf_floor(y), vf_zero()), last);
+    *off_u = x - column - vf_set1(0.5f);
+    *off_v = y - row - vf_set1(0.5f);
+    return vi_truncate(row * vf_set1((float)table->stride) + column);
 }
 
 /* The pixel whose ray is nearest, and the squared distances from it: across the rings that the map makes of circles, and along them on the disc, both over the disc's
@@ -62,13 +67,13 @@ VINL vi pixel_at(const es_micro_table* table, vf u, vf v)
 VINL vi pixel_of(const es_micro_table* table, const lanes* l, vf u, vf v, vf* across, vf* along)
 {
     const float size = (float)table->size;
-    const vf half = vf_set1(0.5f * size), scale = vf_set1(0.4999998f * size), x = u * scale + half - l->shift[0], y = v * scale + half - l->shift[1];
-    const vf last = vf_set1(size - 1.0f), column = vf_min(vf_max(vf_floor(x), vf_zero()), last), row = vf_min(vf_max(vf_floor(y), vf_zero()), last);
-    const vf dx = x - column - vf_set1(0.5f), dy = y - row - vf_set1(0.5f), x2 = dx * dx, y2 = dy * dy;
+    vf dx, dy;
+    const vi pixel = pixel_at(table, l, u, v, &dx, &dy);
+    const vf x2 = dx * dx, y2 = dy * dy;
     const vm wide = vm_ge(vf_abs(u), vf_abs(v));
     *across = vf_select(wide, x2, y2) * vf_set1(4.0f / (size * size));
     *along = vf_select(wide, y2, x2) * vf_set1(4.0f * 0.61685028f / (size * size));
-    return vi_truncate(row * vf_set1((float)table->stride) + column);
+    return pixel;
 }
 
 /* ---- lobes: between directions in the axes and the disc ---------------------------------------------------------------------------- */
@@ -215,7 +220,8 @@ VINL vi lobe_pixel(const es_micro_table* table, const lanes* l, const es_micro_s
     const vf across = table_at(&s->marginal[0][0], vi_iota(), VW, u, &column);
     const vf along = table_at(&s->conditional[0][0][0], column * vi_set1((ES_MICRO_GRID + 1) * VW) + vi_iota(), VW, v, &row);
     const vf two = vf_set1(2.0f), one = vf_set1(1.0f);
-    return pixel_at(table, vf_min(across * two - one, one), vf_min(along * two - one, one));
+    vf off_u, off_v;
+    return pixel_at(table, l, vf_min(across * two - one, one), vf_min(along * two - one, one), &off_u, &off_v);
 }
 
 /* The place in [-1, 1] of a running sum's share; *cell is where it is, or before. */
@@ -278,6 +284,7 @@ static void find_lobe_rays(const es_micro_table* table, const lanes* l, uint32_t
         rays->axis[2][at / VW] = mz * inverse;
         rays->cosine[at / VW] = es_minf(least - 1e-6f, 1.0f);
     }
+    for (uint32_t at = table->stride * size / VW; at % VW; at++) rays->cosine[at] = rays->axis[0][at] = rays->axis[1][at] = rays->axis[2][at] = 0.0f; /* cones are read eight at a time */
 }
 
 #endif

@@ -4,8 +4,8 @@
  *
  * A point looks along each of its rays into the pictures. It guesses that what it sees is as far as what it saw by the ray above; where that is, seen from the
  * middle, the picture says how far what is there is, which makes a better guess (Szirmay-Kalos et al. 2005: distance impostors). What a look finds counts if it is
- * about as far as the look was: otherwise it is seen past an edge, from the middle but not from the point. A look that finds nothing of that kind is followed by one
- * at where what is left out ends, and by others further and further away: a guess from infinity may see what the ray passes by.
+ * about as far as the look was: otherwise it is seen past an edge, from the middle but not from the point. Where the guess finds
+ * nothing, the next look is at where what is left out ends, and others are further and further away: what is seen from infinity may be what the ray passes by.
  *
  * The picture is a map of directions (x, y, z), z along the cell's axis, in one chart or two. First the sphere is turned into itself by the conformal map that
  * multiplies tan(θ/2) by k: of a direction of length ρ
@@ -276,10 +276,14 @@ VINL void far_in_tree(far_finder* f, const es_point_tree* tree, uint32_t index, 
             vf wide = vf_max(d + vf_set1(0.5f) * z, vf_set1(0.5f) * d);
             if (f->layout.zoomed) {
                 vf finest = z;
-                if (f->layout.zoom > 1.0f) { /* where it grows most of all that the sphere may cover: the middle of a wide node may be far from where the map is fine */
-                    const vf inverse = one / vf_max(d, vf_set1(1e-30f)), sphere = vf_min(v.r * inverse, one), sphere_cosine = vf_sqrt(one - sphere * sphere);
+                /* where it grows most of all that the sphere may cover: the middle of a wide node may be far from where the map is fine. With k² < 3 that is the front
+                 * chart's rim, from where it falls to both sides */
+                if (f->layout.zoom > 1.0f) {
+                    const float k2 = f->layout.zoom * f->layout.zoom, rim = k2 < 3.0f ? (k2 - 1.0f) / (k2 + 1.0f) : 1.0f;
+                    const vf inverse = one / vf_max(d, vf_set1(1e-30f)), sphere = vf_min(vf_max(v.r, zero), d) * inverse, sphere_cosine = vf_sqrt(vf_max(one - sphere * sphere, zero));
                     const vf cosine = z * inverse, sine = vf_sqrt(vf_max(one - cosine * cosine, zero));
-                    finest = d * vf_select(vm_ge(cosine, sphere_cosine), one, vf_min(cosine * sphere_cosine + sine * sphere, one));
+                    const vf towards = vf_select(vm_ge(cosine, sphere_cosine), one, vf_min(cosine * sphere_cosine + sine * sphere, one));
+                    finest = vf_max(z, d * vf_min(towards, vf_set1(rim)));
                 }
                 const vf near = d + finest, far = vf_set1(f->layout.zoom * f->layout.zoom) * (d - finest), up = near - far;
                 wide = near + far + vf_set1(0.5f) * vf_abs(up);
@@ -442,6 +446,12 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
 /* From one look that has found nothing to the next, and within which what is found is as far as the look was. */
 #define FURTHER 1.5f
 #define AS_FAR 1.3f
+/* What a cell leaves to its parts ends within so many times its `near`, seen from anywhere in it: half of that is its radius, and nodes that are left are not large. */
+#define LEFT_WITHIN 2.5f
+
+/* The further a point is from the middle, the further apart are the places where a ray may meet something, seen from there: at an eighth of `near`, a few texels.
+ * The picture of all there is goes furthest. */
+static int looks_of(float offset, float near, bool outermost) { return 2 + (int)es_minf(8.0f * offset / es_maxf(near, 1e-18f) + 0.999f, outermost ? 3.0f : 2.0f); }
 
 /* A point in the cell's axes, from its middle; columns of `turn` are the point's axes there. Looks go from `near` to `far`, metres, `looks` at the most. */
 typedef struct onlooker { float offset[3], turn[3][3], near, far; int looks; } onlooker;
@@ -466,7 +476,7 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
         }
         for (uint32_t i = 0; i < n; i++) {
             word[i] = empty;
-            done[i] = vi_zero();
+            done[i] = ~vm_first((int32_t)size - (int32_t)(i * VW)); /* beyond the row's end */
         }
         float next = o->near;
         for (int look = 0; look < o->looks && (look < 2 || next < o->far * FURTHER); look++, next *= FURTHER) {
@@ -493,9 +503,8 @@ VINL void look_at_rows(const es_micro_job* job, const es_micro_panorama* p, cons
         for (uint32_t i = 0; i < n; i++) {
             int32_t* to = pixels + (row * n + i) * VW;
             t[i] = vf_select(vi_eq(word[i], empty), extent, t[i]);
-            const vm outside = ~vm_first((int32_t)size - (int32_t)(i * VW));
             const vi key = depth_of(t[i] * t[i], job->inverse_square) | (word[i] & vi_set1(0xffff));
-            vi_store(to, vi_min(vi_load(to), vi_select(vi_eq(word[i], empty) | outside, empty, key)));
+            vi_store(to, vi_min(vi_load(to), vi_select(vi_eq(word[i], empty), empty, key)));
         }
     }
 }

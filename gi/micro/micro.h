@@ -30,7 +30,7 @@ typedef struct es_micro_settings {
     float cover;           /* a node is drawn into the pixel whose ray is nearest to its centre, where a disc of so many times its area covers that ray, or, of lobes, is within a
                             * twentieth of a radian of it. Gaps are closed */
     float share;           /* what is further than this many radii of a cell of points is seen from the cell's middle, and looked up there; less than 1 is as 1; 0: each point sees for itself */
-    bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn into one pixel */
+    bool ray_cast;         /* leaves larger than that are met by rays; off: they are drawn as others are, and leave holes */
     bool warp;             /* pixels are distributed as the lobe is; off: as the cosine, and weighted */
     bool quantised;        /* nodes of 128 bits; off: floats */
 } es_micro_settings;

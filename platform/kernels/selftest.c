@@ -98,8 +98,10 @@ void ES_KERNEL(es_platform_simd_operations)(const float* pa, const float* pb, co
         PUT(vf_store3_2, vf_load(stored + 2 * VW));
         PUT(vf_store3_3, vf_load(stored + 3 * VW));
         const uint32_t bits = vm_bits(vm_lt(a, b));
+        vf_store(stored + VW, a);
         vf_store_packed(stored, c, v_packing_of(bits));
         for (int k = __builtin_popcount(bits); k < VW; k++) stored[k] = 0.0f;
         PUT(vf_store_packed, vf_load(stored));
+        PUT(vf_store_packed_behind, vf_load(stored + VW));
     }
 }

@@ -36,7 +36,8 @@ static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
         settings.half_resolution = i >= 6;
         settings.micro_spacing = i == 10 ? 4 : 1;
         settings.micro_points = 1000;
-        settings.micro_size = 12;
+        settings.micro_size = i == 10 ? 20 : 12;
+        settings.micro_nodes = i == 10 ? ES_MICRO_FLOAT : ES_MICRO_QUANTISED;
         settings.near_distance = i == 6 ? 0.1f : 0.0f;
         es_renderer* renderer = stress_render(&s, &settings);
         assert_all_finite(&s, renderer, "fresh memory");
