@@ -7,6 +7,7 @@
 #include "gi/micro/forest.h"
 #include "platform/maths.h"
 #include "raster/pack.h"
+#include "tests/guarded_planes.h"
 
 /* Trees of these many leaves, powers of two; everything 0. */
 static inline es_point_forest hand_forest(const uint32_t* leaf_counts, uint32_t tree_count)
@@ -70,5 +71,30 @@ static inline void set_leaf(es_point_forest* f, size_t leaf, es_vec3 position, e
 }
 
 static inline float leaf_radiance(const es_point_forest* f, size_t leaf, int k) { return f->radiance[k][node_of_leaf(f, leaf)]; }
+
+/* Other memory for what the nodes send, between guards. */
+typedef struct guarded_radiance { plane planes[3]; float* kept[3]; } guarded_radiance;
+
+static inline guarded_radiance guard_radiance(es_point_forest* f, float everywhere)
+{
+    guarded_radiance g;
+    for (int k = 0; k < 3; k++) {
+        g.planes[k] = new_plane(f->node_count);
+        g.kept[k] = f->radiance[k];
+        f->radiance[k] = at(g.planes[k]);
+        for (size_t i = 0; i < f->node_count; i++) f->radiance[k][i] = everywhere;
+    }
+    return g;
+}
+
+/* The forest has its own again. */
+static inline void check_radiance_guards(es_point_forest* f, const guarded_radiance* g)
+{
+    for (int k = 0; k < 3; k++) {
+        check_guards(g->planes[k]);
+        f->radiance[k] = g->kept[k];
+        free(g->planes[k].memory);
+    }
+}
 
 #endif
