@@ -446,7 +446,8 @@ static bool draw_panorama(const es_micro_job* job, const cell* world, common* c,
 /* From one look that has found nothing to the next, and within which what is found is as far as the look was. */
 #define FURTHER 1.5f
 #define AS_FAR 1.3f
-/* What a cell leaves to its parts ends within so many times its `near`, seen from anywhere in it: half of that is its radius, and nodes that are left are not large. */
+/* What a cell leaves to its parts ends within so many times its `near`, seen from anywhere in it: of a node that is left the radius is a quarter of that at the most,
+ * so that it ends at 3/2, and of the cell no more than that. */
 #define LEFT_WITHIN 2.5f
 
 /* The further a point is from the middle, the further apart are the places where a ray may meet something, seen from there: at an eighth of `near`, a few texels.
