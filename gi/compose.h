@@ -10,13 +10,29 @@ enum { ES_SRGB_TABLE_SIZE = 4096 };
 typedef struct es_srgb_table { uint32_t code[ES_SRGB_TABLE_SIZE]; } es_srgb_table;
 void es_srgb_table_fill(es_srgb_table* table);
 
+/* Indirect light besides what virtual point lights or micro-buffers send, in the order in which it is added to theirs. */
+typedef enum es_further_light {
+    ES_FURTHER_RAYS,              /* what bounding left out, found by rays (gi/bias_compensation.h) */
+    ES_FURTHER_NEGATIVE,          /* of negative lights (gi/second_order.h) */
+    ES_FURTHER_RESIDUAL,          /* what bounding left out, found in screen space: a step each (gi/screen/residual.h) */
+    ES_FURTHER_BOUNCE = ES_FURTHER_RESIDUAL + 4, /* of one bounce in screen space */
+    ES_FURTHER_LIGHTS
+} es_further_light;
+
+/* radiance = (emitted + direct) + indirect,
+ * direct = that of light sources without a size + that of lamps,
+ * indirect = ((bounded + further[0]) + further[1]) + …, bounded = diffuse + lobe; what is NULL is left out.
+ * The sums are what stands here, in this order, so that the parts' images add up to the whole's to the bit. */
 typedef struct es_compose_job {
     const es_gbuffer* gbuffer;
-    const float* direct[3];       /* NULL: none */
+    const float* direct[3];       /* reflected radiance; NULL: none */
+    const float* lamp_irradiance[3]; /* direct irradiance of lamps on the diffuse part, NULL: none */
+    const float* lamp_specular[3];   /* their radiance reflected by the lobe, NULL: none */
+    const uint8_t* lamp_lit;         /* where that may be lit (gi/lit.h) */
     const float* irradiance[3];   /* indirect irradiance on the diffuse part, NULL: none */
     const float* specular[3];     /* indirect radiance reflected by the lobe, NULL: none */
     const uint8_t* lit;           /* where that may be lit (gi/lit.h) */
-    const float* compensation[3]; /* further reflected indirect radiance, of either sign; NULL: none */
+    const float* further[ES_FURTHER_LIGHTS][3]; /* reflected radiance, of either sign; NULL: none */
     const float* finished[3];     /* the radiance itself, in place of all of the above; NULL: it is to be made */
     float exposure_scale;         /* 2^stops */
     float white;                  /* Reinhard: the radiance that becomes 1 */
@@ -24,7 +40,10 @@ typedef struct es_compose_job {
     uint32_t* xrgb;               /* sRGB-encoded, width words a row; NULL: not wanted */
     const es_srgb_table* srgb;    /* for xrgb */
     float* radiance[3];           /* before exposure, rows of gbuffer->stride; NULL: not wanted */
-    float* indirect[3];           /* the indirect part of it; NULL: not wanted */
+    float* emitted[3];            /* its parts; NULL: not wanted */
+    float* whole_direct[3];
+    float* bounded[3];
+    float* indirect[3];
     float* display[3];            /* after the tone map, linear [0, 1]; NULL: not wanted */
 } es_compose_job;
 

@@ -10,16 +10,17 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
     {IMAGE_DISPLAY, "display", "what the window shows: tone-mapped, linear 0 to 1"},
-    {IMAGE_RADIANCE, "radiance", "direct + indirect + emission, W/(m² sr)"},
+    {IMAGE_RADIANCE, "radiance", "(emission + direct) + indirect, to the bit without anti-aliasing, W/(m² sr)"},
     {IMAGE_DIRECT, "direct", "reflected direct light, W/(m² sr)"},
-    {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr)"},
+    {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr): indirect-bounded and what is added to it, to the bit in the order of this list"},
+    {IMAGE_BOUNDED, "indirect-bounded", "of the indirect light, what virtual point lights or micro-buffers send"},
     {IMAGE_BOUNCE, "indirect-1", "of the indirect light, the first bounce; indirect-2 … indirect-16 likewise; their sum is it to the bit, before history"},
     {IMAGE_INDIRECT_UNFILTERED, "indirect-unfiltered", "indirect light with the interleaved pattern still in it"},
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
@@ -30,7 +31,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},
     {IMAGE_DEPTH, "depth", "distance along the view axis, metres; 0 where nothing is"},
     {IMAGE_MOTION, "motion", "pixel position now minus last frame's"},
-    {IMAGE_EMISSION, "emission", "emitted radiance, W/(m² sr)"},
+    {IMAGE_EMISSION, "emission", "emitted radiance and the colour of what is unlit, W/(m² sr)"},
     {IMAGE_METALLIC, "metallic", "0 to 1"},
     {IMAGE_ROUGHNESS, "roughness", "0 to 1; Phong surfaces: exponent / 50"},
     {IMAGE_SPECULAR, "specular", "weight of the specular lobe, 0 to 1"},
@@ -159,7 +160,7 @@ static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* 
     }
     if (kind == IMAGE_INDIRECT_UNFILTERED) job.lit = NULL;
     if (kind != IMAGE_DISPLAY && kind != IMAGE_RADIANCE) memset(job.finished, 0, sizeof job.finished);
-    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : job.indirect;
+    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : kind == IMAGE_DIRECT ? job.whole_direct : kind == IMAGE_EMISSION ? job.emitted : kind == IMAGE_BOUNDED ? job.bounded : job.indirect;
     for (int k = 0; k < 3; k++) {
         target[k] = planes.at[k];
         if (kind == IMAGE_INDIRECT_UNFILTERED) {
@@ -288,14 +289,16 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     switch (kind) {
     case IMAGE_DISPLAY:
     case IMAGE_RADIANCE:
+    case IMAGE_EMISSION:
+    case IMAGE_DIRECT:
+    case IMAGE_BOUNDED:
     case IMAGE_INDIRECT:
     case IMAGE_INDIRECT_UNFILTERED: result = put_composed(renderer, kind, image); break;
     case IMAGE_BOUNCE: result = es_bounce_image(renderer, bounce_of(name), image); break;
-    case IMAGE_DIRECT:
     case IMAGE_IRRADIANCE:
     case IMAGE_COMPENSATION: {
         es_compose_job job = es_renderer_compose_job(renderer);
-        const float* const* planes = kind == IMAGE_DIRECT ? job.direct : kind == IMAGE_IRRADIANCE ? job.irradiance : job.compensation;
+        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : job.further[ES_FURTHER_RAYS];
         if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }
@@ -308,13 +311,6 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
             for (uint32_t x = 0; x < width; x++) {
                 image->pixels[((size_t)y * width + x) * 2] = g->motion_x[(size_t)y * g->stride + x];
                 image->pixels[((size_t)y * width + x) * 2 + 1] = g->motion_y[(size_t)y * g->stride + x];
-            }
-        break;
-    case IMAGE_EMISSION:
-        for (uint32_t y = 0; y < height; y++)
-            for (uint32_t x = 0; x < width; x++) {
-                es_vec3 e = es_unpack_rgb9e5(g->emission[(size_t)y * g->stride + x]);
-                memcpy(image->pixels + ((size_t)y * width + x) * 3, &e, sizeof e);
             }
         break;
     case IMAGE_SHADOW_MAP: if (light) put_shadow_map(light, image); break;

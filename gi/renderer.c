@@ -426,7 +426,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (es_indirect_is_there(r)) job.irradiance[k] = irradiance->at[k];
         if (es_indirect_is_there(r) && r->has_specular) job.specular[k] = specular->at[k];
-        if (r->plan.valid[ES_PASS_COMPENSATION]) job.compensation[k] = r->compensation.at[k];
+        if (r->plan.valid[ES_PASS_COMPENSATION]) job.further[ES_FURTHER_RAYS][k] = r->compensation.at[k];
         if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
     return job;

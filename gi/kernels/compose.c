@@ -43,52 +43,57 @@ static inline vf display_range(vf a) { return vf_min(vf_max(a, vf_zero()), vf_se
 /* a in [0, 1]; with a power instead of the table the pass took more than twice as long */
 static inline vi srgb8(const es_srgb_table* table, vf a) { return vi_gather(table->code, vi_round(vf_sqrt(a) * vf_set1((float)(ES_SRGB_TABLE_SIZE - 1)))); }
 
-/* From its parts; stores the indirect one where it is wanted. */
+VINL void store_rgb(float* const to[3], size_t at, rgb_v c)
+{
+    if (!to[0]) return;
+    vf_store(to[0] + at, c.r);
+    vf_store(to[1] + at, c.g);
+    vf_store(to[2] + at, c.b);
+}
+
+VINL rgb_v load_rgb(const float* const from[3], size_t at) { return (rgb_v){vf_load(from[0] + at), vf_load(from[1] + at), vf_load(from[2] + at)}; }
+VINL rgb_v sum(rgb_v a, rgb_v b) { return (rgb_v){a.r + b.r, a.g + b.g, a.b + b.b}; }
+
+/* Reflected by the diffuse part, `diffuse` being what albedo is multiplied by, and by the lobe. */
+VINL rgb_v reflected(const float* const irradiance[3], const float* const specular[3], bool lobes, rgb_v albedo, vf diffuse, size_t at)
+{
+    rgb_v c = {vf_zero(), vf_zero(), vf_zero()};
+    if (irradiance[0]) c = (rgb_v){albedo.r * diffuse * vf_load(irradiance[0] + at), albedo.g * diffuse * vf_load(irradiance[1] + at), albedo.b * diffuse * vf_load(irradiance[2] + at)};
+    return lobes ? sum(c, load_rgb(specular, at)) : c;
+}
+
+/* From its parts; stores those that are wanted. */
 VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y)
 {
     const es_gbuffer* g = job->gbuffer;
-    const size_t at = (size_t)y * g->stride + x;
+    const size_t at = (size_t)y * g->stride + x, chunk = (size_t)y * es_lit_chunks(g->stride) + x / ES_LIT_COLUMNS;
     vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at), surface = vi_load(g->surface + at);
     rgb_v albedo = {es_unpack_unorm16_v(rg), es_unpack_unorm16_v(vi_shift_right_logical(rg, 16)), es_unpack_unorm16_v(b)};
     rgb_v c;
     es_unpack_rgb9e5_v(vi_load(g->emission + at), &c.r, &c.g, &c.b);
     vm unlit = vi_eq(vi_shift_right_logical(surface, 24), vi_set1(ES_SURFACE_UNLIT)) & vm_gt(vf_load(g->depth + at), vf_zero());
-    c.r = c.r + vf_and(unlit, albedo.r);
-    c.g = c.g + vf_and(unlit, albedo.g);
-    c.b = c.b + vf_and(unlit, albedo.b);
-    if (job->direct[0]) {
-        c.r = c.r + vf_load(job->direct[0] + at);
-        c.g = c.g + vf_load(job->direct[1] + at);
-        c.b = c.b + vf_load(job->direct[2] + at);
+    c = sum(c, (rgb_v){vf_and(unlit, albedo.r), vf_and(unlit, albedo.g), vf_and(unlit, albedo.b)});
+    store_rgb(job->emitted, at, c);
+    const bool lamps = job->lamp_irradiance[0] || job->lamp_specular[0];
+    vf diffuse = vf_zero();
+    if (job->irradiance[0] || job->lamp_irradiance[0]) diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f));
+
+    rgb_v direct = {vf_zero(), vf_zero(), vf_zero()};
+    if (job->direct[0]) direct = load_rgb(job->direct, at);
+    if (lamps) {
+        const rgb_v lit = reflected(job->lamp_irradiance, job->lamp_specular, job->lamp_specular[0] && (!job->lamp_lit || job->lamp_lit[chunk] & 1), albedo, diffuse, at);
+        direct = sum(direct, (rgb_v){vf_and(~unlit, lit.r), vf_and(~unlit, lit.g), vf_and(~unlit, lit.b)});
     }
-    rgb_v indirect = {vf_zero(), vf_zero(), vf_zero()};
-    if (job->irradiance[0]) {
-        vf metallic = vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f);
-        vf diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - metallic);
-        indirect.r = albedo.r * diffuse * vf_load(job->irradiance[0] + at);
-        indirect.g = albedo.g * diffuse * vf_load(job->irradiance[1] + at);
-        indirect.b = albedo.b * diffuse * vf_load(job->irradiance[2] + at);
-    }
-    if (job->specular[0] && (!job->lit || job->lit[(size_t)y * es_lit_chunks(g->stride) + x / ES_LIT_COLUMNS] & 1)) {
-        indirect.r = indirect.r + vf_load(job->specular[0] + at);
-        indirect.g = indirect.g + vf_load(job->specular[1] + at);
-        indirect.b = indirect.b + vf_load(job->specular[2] + at);
-    }
-    if (job->compensation[0]) {
-        indirect.r = indirect.r + vf_load(job->compensation[0] + at);
-        indirect.g = indirect.g + vf_load(job->compensation[1] + at);
-        indirect.b = indirect.b + vf_load(job->compensation[2] + at);
-    }
+    store_rgb(job->whole_direct, at, direct);
+    c = sum(c, direct);
+
+    rgb_v indirect = reflected(job->irradiance, job->specular, job->specular[0] && (!job->lit || job->lit[chunk] & 1), albedo, diffuse, at);
     indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
-    c.r = c.r + indirect.r;
-    c.g = c.g + indirect.g;
-    c.b = c.b + indirect.b;
-    if (job->indirect[0]) {
-        vf_store(job->indirect[0] + at, indirect.r);
-        vf_store(job->indirect[1] + at, indirect.g);
-        vf_store(job->indirect[2] + at, indirect.b);
-    }
-    return c;
+    store_rgb(job->bounded, at, indirect);
+    for (int i = 0; i < ES_FURTHER_LIGHTS; i++)
+        if (job->further[i][0]) indirect = sum(indirect, load_rgb(job->further[i], at));
+    store_rgb(job->indirect, at, indirect);
+    return sum(c, indirect);
 }
 
 void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uint32_t row_end)
@@ -97,22 +102,14 @@ void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uin
     for (uint32_t y = row_begin; y < row_end; y++) {
         for (uint32_t x = 0; x < g->width; x += VW) {
             size_t at = (size_t)y * g->stride + x;
-            rgb_v c = job->finished[0] ? (rgb_v){vf_load(job->finished[0] + at), vf_load(job->finished[1] + at), vf_load(job->finished[2] + at)} : radiance_at(job, x, y);
-            if (job->radiance[0]) {
-                vf_store(job->radiance[0] + at, c.r);
-                vf_store(job->radiance[1] + at, c.g);
-                vf_store(job->radiance[2] + at, c.b);
-            }
+            rgb_v c = job->finished[0] ? load_rgb(job->finished, at) : radiance_at(job, x, y);
+            store_rgb(job->radiance, at, c);
             if (!job->xrgb && !job->display[0]) continue;
             c = scaled(c, vf_set1(job->exposure_scale));
             if (job->tone_map == ES_TONE_MAP_REINHARD) c = reinhard(c, job->white);
             else if (job->tone_map == ES_TONE_MAP_PBR_NEUTRAL) c = pbr_neutral(c);
             c = (rgb_v){display_range(c.r), display_range(c.g), display_range(c.b)};
-            if (job->display[0]) {
-                vf_store(job->display[0] + at, c.r);
-                vf_store(job->display[1] + at, c.g);
-                vf_store(job->display[2] + at, c.b);
-            }
+            store_rgb(job->display, at, c);
             if (job->xrgb) {
                 vi word = (srgb8(job->srgb, c.r) << 16) | (srgb8(job->srgb, c.g) << 8) | srgb8(job->srgb, c.b);
                 uint32_t* out = job->xrgb + (size_t)y * g->width + x;
