@@ -6,6 +6,7 @@
 #include "gi/bounces.h"
 #include "gi/compose.h"
 #include "gi/direct.h"
+#include "gi/environment.h"
 #include "gi/error/flip.h"
 #include "gi/filter.h"
 #include "gi/gi.h"
@@ -68,7 +69,11 @@
     X(widen_lobes, (es_point_lobe* leaves, uint32_t begin, uint32_t end))                                        \
     X(forest_blend, (const es_node_looks* looks, uint32_t begin, uint32_t end))                                  \
     /* points order[first … first + count), 1 … ES_MICRO_CELL of them */                                         \
-    X(micro_gather, (const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* scratch))
+    X(micro_gather, (const es_micro_job* job, uint32_t first, uint32_t count, es_micro_scratch* scratch))         \
+    /* rows [row_begin, row_end) of a level */                                                                    \
+    X(environment_lobes, (const es_environment_lobe_job* job, uint32_t row_begin, uint32_t row_end))              \
+    X(environment_irradiance, (const es_environment_irradiance_job* job, uint32_t row_begin, uint32_t row_end))   \
+    X(environment_ask, (const es_environment_lookup* lookup, const es_environment_question* question))
 
 struct es_gi_kernels {
 #define ES_GI_KERNEL_FIELD(name, arguments) void (*name) arguments;

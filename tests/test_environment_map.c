@@ -1,0 +1,352 @@
+/* The environment's octahedral maps against sums over the image in double: no power is lost, directions are where they belong, irradiance and lobes
+ * are what they are said to be, and sets of lights have all of the light (gi/environment.h). */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "gi/environment.h"
+#include "platform/maths.h"
+#include "platform/random.h"
+#include "tests/same_bits.h"
+
+static const double pi = 3.14159265358979323846;
+enum { MOST = 256 };
+
+typedef struct answers { float radiance[3][MOST], irradiance[3][MOST]; } answers;
+
+static es_context* new_context(void)
+{
+    es_context_desc desc = es_default_context_desc();
+    desc.threads = 2;
+    es_context* context;
+    assert_int_equal(es_context_create(&desc, &context), ES_OK);
+    return context;
+}
+
+/* `count` directions all over the sphere. */
+static void spread(uint32_t count, float d[3][MOST])
+{
+    for (uint32_t i = 0; i < count; i++) {
+        double y = 1 - (2 * i + 1.0) / count, s = sqrt(1 - y * y), turn = i * 2.39996322972865332;
+        d[0][i] = (float)(s * sin(turn));
+        d[1][i] = (float)y;
+        d[2][i] = (float)(s * cos(turn));
+    }
+}
+
+static void ask(const es_context* context, const es_environment_map* map, float d[3][MOST], float roughness, answers* a)
+{
+    float rough[MOST];
+    for (int i = 0; i < MOST; i++) rough[i] = roughness;
+    es_environment_question q = {.x = d[0], .y = d[1], .z = d[2], .roughness = rough, .count = MOST};
+    for (int k = 0; k < 3; k++) {
+        q.radiance[k] = a->radiance[k];
+        q.irradiance[k] = a->irradiance[k];
+    }
+    es_environment_ask(context, &map->lookup, &q);
+}
+
+/* ---- the image in double ------------------------------------------------------------------------------------------------ */
+
+typedef struct place { double d[3], solid_angle; } place;
+
+/* The middle of part (x, y) of width × height, as es_environment_desc says where it is. */
+static place place_of(uint32_t x, uint32_t y, uint32_t width, uint32_t height, double rotation)
+{
+    double polar = pi * (y + 0.5) / height, azimuth = 2 * pi * ((x + 0.5) / width - 0.5) - rotation;
+    return (place){{sin(polar) * sin(azimuth), cos(polar), -sin(polar) * cos(azimuth)}, 2 * pi / width * (cos(pi * y / height) - cos(pi * (y + 1.0) / height))};
+}
+
+/* Sum over the image of radiance × weight(cosine with n), each texel in parts × parts. */
+typedef double (*weight_function)(double cosine, double alpha);
+static double facing(double cosine, double alpha) { return fmax(cosine, 0); }
+static double everywhere(double cosine, double alpha) { return 1; }
+/* N = V = R: the density D / 4 of mirrored directions, times the cosine; to be divided by its own sum */
+static double lobe(double cosine, double alpha)
+{
+    double half = (1 + cosine) / 2, t = half * (alpha * alpha - 1) + 1;
+    return cosine > 0 ? cosine * alpha * alpha / (4 * pi * t * t) : 0;
+}
+static double gathered(const es_image* image, int channel, double rotation, uint32_t parts, const double n[3], weight_function weight, double alpha, double* weights)
+{
+    double sum = 0, all = 0;
+    for (uint32_t y = 0; y < image->height * parts; y++)
+        for (uint32_t x = 0; x < image->width * parts; x++) {
+            place p = place_of(x, y, image->width * parts, image->height * parts, rotation);
+            double w = p.solid_angle * weight(p.d[0] * n[0] + p.d[1] * n[1] + p.d[2] * n[2], alpha);
+            all += w;
+            sum += w * (double)image->pixels[3 * ((size_t)(y / parts) * image->width + x / parts) + (size_t)channel];
+        }
+    if (weights) *weights = all;
+    return sum;
+}
+
+static es_image new_image(es_context* context, uint32_t width, uint32_t height)
+{
+    es_image image;
+    assert_int_equal(es_image_create(context, width, height, 3, &image), ES_OK);
+    return image;
+}
+
+/* A bright patch on a dim sky over a dark ground, and noise. */
+static void fill_sky(es_image* image)
+{
+    for (uint32_t y = 0; y < image->height; y++)
+        for (uint32_t x = 0; x < image->width; x++) {
+            place p = place_of(x, y, image->width, image->height, 0);
+            float* t = image->pixels + 3 * ((size_t)y * image->width + x);
+            double sun = p.d[0] * 0.6 + p.d[1] * 0.48 + p.d[2] * 0.64;
+            for (int k = 0; k < 3; k++)
+                t[k] = (float)((p.d[1] > 0 ? 1 + 0.5 * p.d[1] * k : 0.1) * (0.75 + 0.5 * (double)es_random_float(5, (uint32_t)(3 * (y * image->width + x)) + (uint32_t)k)) + (sun > 0.995 ? 200 : 0));
+        }
+}
+
+/* ---- tests -------------------------------------------------------------------------------------------------------------- */
+
+static void level_sum(const es_environment_map* map, const es_environment_pyramid* p, uint32_t level, double sum[4])
+{
+    const uint32_t size = (uint32_t)p->size[level], stride = size + 2;
+    uint32_t same = 0;
+    while ((uint32_t)map->means.size[same] != size) same++;
+    const float *texels = p->texels + 4 * (size_t)p->first[level], *solid = map->means.texels + 4 * (size_t)map->means.first[same];
+    memset(sum, 0, 4 * sizeof *sum);
+    for (uint32_t y = 1; y <= size; y++)
+        for (uint32_t x = 1; x <= size; x++) {
+            size_t at = 4 * ((size_t)y * stride + x);
+            for (int k = 0; k < 3; k++) sum[k] += (double)texels[at + (size_t)k] * (double)solid[at + 3];
+            sum[3] += (double)solid[at + 3];
+        }
+}
+
+static void expect_power(const es_environment_map* map, const double power[3], const char* what)
+{
+    for (uint32_t level = 0; level < map->means.levels + map->lookup.lobes.levels; level++) {
+        double sum[4];
+        if (level < map->means.levels) level_sum(map, &map->means, level, sum);
+        else level_sum(map, &map->lookup.lobes, level - map->means.levels, sum);
+        assert_true(fabs(sum[3] / (4 * pi) - 1) < 2e-5);
+        for (int k = 0; k < 3; k++)
+            if (!(fabs(sum[k] - power[k]) <= 3e-5 * power[k])) fail_msg("%s, level %u, channel %d: power %.7g, the image has %.7g", what, level, k, sum[k], power[k]);
+    }
+    for (uint32_t count = 1; count <= 512; count = count * 5 + 2) {
+        static es_environment_light lights[512];
+        uint32_t written = es_environment_sample(map, count, count, lights);
+        double sum[3] = {0}, solid = 0;
+        assert_true(written <= count);
+        for (uint32_t i = 0; i < written; i++) {
+            assert_true(fabsf(es_v3_length(lights[i].direction) - 1) < 1e-5f);
+            for (int k = 0; k < 3; k++) sum[k] += (double)lights[i].irradiance[k];
+            solid += (double)lights[i].solid_angle;
+        }
+        assert_true(solid <= 4 * pi * 1.0001);
+        for (int k = 0; k < 3; k++)
+            if (!(fabs(sum[k] - power[k]) <= 3e-5 * power[k])) fail_msg("%s, %u of %u lights, channel %d: power %.7g, the image has %.7g", what, written, count, k, sum[k], power[k]);
+    }
+}
+
+static void test_power(void** state)
+{
+    static const struct { const char* what; uint32_t width, height, bright; float rotation; } cases[] = {
+        {"one texel of 4 × 2", 4, 2, 5, 0.3f}, {"64 × 32", 64, 32, 100, -2}, {"a texel at the pole", 64, 32, 3, 0}, {"37 × 19", 37, 19, 350, 999}, {"a texel below", 100, 50, 4990, 0.1f},
+#ifndef __SANITIZE_ADDRESS__
+        {"1024 × 512", 1024, 512, 200000, 1}, {"a column", 3, 1000, 1, 2},
+#endif
+    };
+    es_context* context = new_context();
+    es_environment_map map = {0};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        es_image image = new_image(context, cases[i].width, cases[i].height);
+        for (size_t t = 0; t < (size_t)image.width * image.height * 3; t++) image.pixels[t] = 1e-6f * (float)(1 + t % 3);
+        for (uint32_t k = 0; k < 3; k++) image.pixels[3 * cases[i].bright + k] = (float)(3 - k);
+        es_environment_desc desc = {.image = &image, .radiance = {1, 2, 0.5f}, .rotation = cases[i].rotation};
+        assert_int_equal(es_environment_map_build(context, &desc, &map), ES_OK);
+        double power[3], any[3] = {0};
+        for (int k = 0; k < 3; k++) power[k] = (double)desc.radiance[k] * gathered(&image, k, (double)desc.rotation, 1, any, everywhere, 0, NULL);
+        expect_power(&map, power, cases[i].what);
+        es_image_destroy(context, &image);
+    }
+    es_environment_map_free(context, &map);
+    assert_int_equal(es_context_bytes(context), 0);
+    es_context_destroy(context);
+}
+
+static void test_constant(void** state)
+{
+    es_context* context = new_context();
+    es_environment_map map = {0};
+    float d[3][MOST];
+    answers a;
+    spread(MOST, d);
+    for (int pass = 0; pass < 2; pass++) {
+        es_image image = new_image(context, 32, 16);
+        for (int i = 0; i < 32 * 16 * 3; i++) image.pixels[i] = 2;
+        assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.image = pass ? &image : NULL, .radiance = {1, 0.5f, 0}}, &map), ES_OK);
+        const double value = pass ? 2 : 1;
+        for (int r = 0; r <= 10; r++) {
+            ask(context, &map, d, (float)r * 0.1f, &a);
+            for (int i = 0; i < MOST; i++) {
+                assert_true(fabs((double)a.radiance[0][i] - value) < 1e-5 * value && fabs((double)a.radiance[1][i] - value / 2) < 1e-5 * value && a.radiance[2][i] == 0);
+                assert_true(fabs((double)a.irradiance[0][i] / (pi * value) - 1) < 2e-3);
+            }
+        }
+        double power[3] = {4 * pi * value, 2 * pi * value, 0};
+        expect_power(&map, power, "constant");
+        es_image_destroy(context, &image);
+    }
+    assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.radiance = {0, 0, 0}}, &map), ES_OK);
+    es_environment_light light;
+    assert_int_equal(es_environment_sample(&map, 1, 0, &light), 0);
+    es_environment_map_free(context, &map);
+    assert_int_equal(es_environment_sample(&map, 1, 0, &light), 0);
+    es_context_destroy(context);
+}
+
+/* Irradiance and lobes of a sky with a sun in it against sums over the image; texels' middles show the texels. */
+static void test_against_sums(void** state)
+{
+    es_context* context = new_context();
+    es_environment_map map = {0};
+    float d[3][MOST];
+    answers a;
+    spread(MOST, d);
+    es_image image = new_image(context, 64, 32);
+    fill_sky(&image);
+    const float rotation = 0.4f;
+    assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.image = &image, .radiance = {1, 1, 1}, .rotation = rotation}, &map), ES_OK);
+    double most = 0, worst = 0;
+    ask(context, &map, d, 0, &a);
+    for (int i = 0; i < MOST; i += 3) {
+        double n[3] = {(double)d[0][i], (double)d[1][i], (double)d[2][i]}, e = gathered(&image, 1, (double)rotation, 2, n, facing, 0, NULL);
+        most = fmax(most, e);
+        worst = fmax(worst, fabs(e - (double)a.irradiance[1][i]));
+    }
+    if (!(worst < 0.01 * most)) fail_msg("irradiance is off by %.5f, the largest is %.5f", worst, most);
+    static const struct { float roughness; double bound; } cases[] = {{0.25f, 0.9}, {0.35355339f, 0.35}, {0.5f, 0.16}, {0.70710678f, 0.09}, {1, 0.12}, {0.6f, 0.16}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const double alpha = (double)cases[c].roughness * (double)cases[c].roughness;
+        double squares = 0, sum = 0;
+        ask(context, &map, d, cases[c].roughness, &a);
+        int count = 0;
+        for (int i = 0; i < MOST; i += 3, count++) {
+            double n[3] = {(double)d[0][i], (double)d[1][i], (double)d[2][i]}, weights, l = gathered(&image, 1, (double)rotation, alpha < 0.2 ? 4 : 2, n, lobe, alpha, &weights) / weights;
+            squares += pow(l - (double)a.radiance[1][i], 2);
+            sum += l;
+        }
+        double error = sqrt(squares / count) / (sum / count);
+        if (getenv("ES_PRINT")) printf("roughness %.3f: relRMSE %.4f\n", (double)cases[c].roughness, error);
+        if (!(error < cases[c].bound)) fail_msg("roughness %.3f: relRMSE %.4f", (double)cases[c].roughness, error);
+    }
+    if (getenv("ES_PRINT")) printf("irradiance: %.5f of the largest\n", worst / most);
+    es_image_destroy(context, &image);
+    es_environment_map_free(context, &map);
+    assert_int_equal(es_context_bytes(context), 0);
+    es_context_destroy(context);
+}
+
+/* Which way it is turned: middles of texels that are larger than the map's show the texel. */
+static void test_orientation(void** state)
+{
+    enum { WIDTH = 32, HEIGHT = 16 };
+    es_context* context = new_context();
+    es_environment_map map = {0};
+    es_image image = new_image(context, WIDTH, HEIGHT);
+    for (uint32_t i = 0; i < WIDTH * HEIGHT * 3; i++) image.pixels[i] = es_random_float(6, i);
+    const float rotation = 0.4f;
+    assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.image = &image, .radiance = {1, 1, 1}, .rotation = rotation}, &map), ES_OK);
+    for (uint32_t y = 2; y < HEIGHT - 2; y++) {
+        float d[3][MOST];
+        answers a;
+        for (uint32_t i = 0; i < MOST; i++) {
+            place m = place_of(i % WIDTH, y, WIDTH, HEIGHT, (double)rotation);
+            for (int k = 0; k < 3; k++) d[k][i] = (float)m.d[k] * 7; /* need not be unit */
+        }
+        ask(context, &map, d, 0, &a);
+        for (uint32_t x = 0; x < WIDTH; x++)
+            for (uint32_t k = 0; k < 3; k++) {
+                const float value = image.pixels[3 * (y * WIDTH + x) + k];
+                if (!(fabsf(a.radiance[k][x] - value) < 1e-5f)) fail_msg("texel (%u, %u): %.5f, not %.5f", x, y, (double)a.radiance[k][x], (double)value);
+            }
+    }
+    es_image_destroy(context, &image);
+    es_environment_map_free(context, &map);
+    es_context_destroy(context);
+}
+
+/* A set of lights lights a surface as the sky does; seeds move it, and a small sun keeps its place. */
+static void test_lights(void** state)
+{
+    es_context* context = new_context();
+    es_environment_map map = {0};
+    es_image image = new_image(context, 64, 32);
+    fill_sky(&image);
+    assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.image = &image, .radiance = {1, 1, 1}}, &map), ES_OK);
+    static es_environment_light lights[512], others[512];
+    float d[3][MOST];
+    spread(MOST, d);
+    uint32_t count = es_environment_sample(&map, 512, 1, lights);
+    assert_true(count > 480);
+    assert_true(es_environment_sample(&map, 512, 2, others) > 480 && memcmp(lights, others, sizeof lights) != 0);
+    double most = 0, worst = 0;
+    for (int i = 0; i < MOST; i += 3) {
+        double n[3] = {(double)d[0][i], (double)d[1][i], (double)d[2][i]}, e = gathered(&image, 2, 0, 2, n, facing, 0, NULL), sum = 0;
+        for (uint32_t k = 0; k < count; k++)
+            sum += (double)lights[k].irradiance[2] * fmax(0, n[0] * (double)lights[k].direction.x + n[1] * (double)lights[k].direction.y + n[2] * (double)lights[k].direction.z);
+        most = fmax(most, e);
+        worst = fmax(worst, fabs(sum - e));
+    }
+    if (!(worst < 0.01 * most)) fail_msg("512 lights: irradiance is off by %.5f, the largest is %.5f", worst, most);
+    /* one texel in the whole sky */
+    for (int i = 0; i < 64 * 32 * 3; i++) image.pixels[i] = 0;
+    place at = place_of(11, 9, 64, 32, 0);
+    for (int k = 0; k < 3; k++) image.pixels[3 * (9 * 64 + 11) + k] = 5;
+    assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.image = &image, .radiance = {1, 1, 1}}, &map), ES_OK);
+    count = es_environment_sample(&map, 16, 9, lights);
+    assert_true(count >= 1 && count <= 16);
+    for (uint32_t k = 0; k < count; k++) {
+        double cosine = at.d[0] * (double)lights[k].direction.x + at.d[1] * (double)lights[k].direction.y + at.d[2] * (double)lights[k].direction.z;
+        assert_true(cosine > cos(0.08));
+    }
+    es_image_destroy(context, &image);
+    es_environment_map_free(context, &map);
+    es_context_destroy(context);
+}
+
+static void test_same_bits(void** state)
+{
+    static float pixels[64 * 32 * 3];
+    es_image image = {.width = 64, .height = 32, .channels = 3, .pixels = pixels};
+    fill_sky(&image);
+    same_bits same = {.most_threads = 3};
+    for (es_context* context; (context = next_context(&same));) {
+        es_environment_map map = {0};
+        assert_int_equal(es_environment_map_build(context, &(es_environment_desc){.image = &image, .radiance = {1, 2, 3}, .rotation = 2}, &map), ES_OK);
+        expect_same_bits(&same, map.memory, map.bytes);
+        float d[3][MOST];
+        answers a;
+        spread(MOST, d);
+        ask(context, &map, d, 0.3f, &a);
+        expect_same_bits(&same, &a, sizeof a);
+        es_environment_map_free(context, &map);
+        es_context_destroy(context);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_power),
+        cmocka_unit_test(test_constant),
+        cmocka_unit_test(test_against_sums),
+        cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_lights),
+        cmocka_unit_test(test_same_bits),
+    };
+    return cmocka_run_group_tests_name("environment map", tests, NULL, NULL);
+}
