@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "gi/kernel_table.h"
+#include "gi/subsets.h"
 #include "platform/context.h"
 #include "platform/random.h"
 #include "raster/pack.h"
@@ -237,20 +238,13 @@ static es_vpl_record record_of(const bounce_loop* loop, const place* p, double i
     };
 }
 
-/* Lights of one subset of the pattern have numbers that follow one another: each run of them is spread evenly. */
-static uint32_t place_in_sequence(uint32_t light, uint32_t count, uint32_t subsets)
-{
-    uint32_t subset = light % subsets, smaller = count / subsets, larger = count % subsets;
-    return subset * smaller + (subset < larger ? subset : larger) + light / subsets;
-}
-
 static es_vpl_record make_light(const bounce_loop* loop, uint32_t light, uint32_t worker)
 {
     const es_bounce_job* job = loop->job;
     const uint32_t own = es_random_u32(job->seed ^ loop->shift, light);
     const float* weights = loop->weights + worker * loop->places;
     const float* sums = loop->sums + worker * (loop->places / LANES);
-    float u = es_radical_inverse(2, place_in_sequence(light, job->count, job->subsets) + 1) + es_unit_float(loop->shift);
+    float u = es_radical_inverse(2, es_place_in_sequence(light, job->count, job->subsets) + 1) + es_unit_float(loop->shift);
     if (u >= 1.0f) u -= 1.0f;
 
     double total = 0.0, weight = 0.0, seen = 1.0;

@@ -52,6 +52,13 @@ typedef enum es_bounce_method {
 
 enum { ES_MAX_BOUNCES = 16 };
 
+/* Direct light of surfaces that glow and of the environment. */
+typedef enum es_lamps_method {
+    ES_LAMPS_NONE,        /* they light nothing */
+    ES_LAMPS_MAPS,        /* by a set of lights with imperfect shadow maps (Ritschel thesis §5.4.3) */
+    ES_LAMPS_TRACED       /* by the same set, a ray for each pair of light and pixel that face each other */
+} es_lamps_method;
+
 /* With MICRO: nodes of the point hierarchy. */
 typedef enum es_micro_nodes { ES_MICRO_QUANTISED /* 128 bits each (§6.3.1) */, ES_MICRO_FLOAT } es_micro_nodes;
 
@@ -161,7 +168,14 @@ typedef struct es_renderer_settings {
     uint32_t micro_iterations;       /* RADIOSITY: times that it is gathered; 0: bounces - 1 */
     uint32_t micro_photons;          /* PHOTONS: sent from all lights */
     float micro_rebuild;             /* how much worse than new a deforming mesh's tree may be before it is built anew */
-    bool micro_emission;             /* glowing surfaces send light */
+    bool micro_emission;             /* glowing surfaces send light to micro-buffers where they do not light the picture as lamps */
+    /* lamps: direct light of glowing surfaces and of the environment */
+    uint32_t lamps;                  /* es_lamps_method */
+    uint32_t lamp_count;             /* lights that stand for all of them */
+    uint32_t lamp_size;              /* texels of a side of their imperfect maps: 32, 64, 128, 256; points and filling are those of the others */
+    uint32_t lamp_interleave;        /* n of the n × n pattern, 1 … 16, and of its filter, which is applied filter_passes times */
+    float lamp_roughness;            /* lobes sharper than this GGX roughness are widened to it under lamps */
+    float lamp_slope_bias;           /* of their maps, as ism_slope_bias */
 } es_renderer_settings;
 
 ES_API es_renderer_settings es_default_renderer_settings(void);

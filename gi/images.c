@@ -10,7 +10,7 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
@@ -19,6 +19,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_DISPLAY, "display", "what the window shows: tone-mapped, linear 0 to 1"},
     {IMAGE_RADIANCE, "radiance", "(emission + direct) + indirect, to the bit without anti-aliasing, W/(m² sr)"},
     {IMAGE_DIRECT, "direct", "reflected direct light, W/(m² sr)"},
+    {IMAGE_LAMPS, "lamps", "of the direct light, that of glowing surfaces and of the environment"},
     {IMAGE_INDIRECT, "indirect", "reflected indirect light, W/(m² sr): indirect-bounded and what is added to it, to the bit in the order of this list"},
     {IMAGE_BOUNDED, "indirect-bounded", "of the indirect light, what virtual point lights or micro-buffers send"},
     {IMAGE_BOUNCE, "indirect-1", "of the indirect light, the first bounce; indirect-2 … indirect-16 likewise; their sum is it to the bit, before history"},
@@ -159,8 +160,9 @@ static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* 
         specular = renderer->specular;
     }
     if (kind == IMAGE_INDIRECT_UNFILTERED) job.lit = NULL;
+    if (kind == IMAGE_LAMPS) memset(job.direct, 0, sizeof job.direct);
     if (kind != IMAGE_DISPLAY && kind != IMAGE_RADIANCE) memset(job.finished, 0, sizeof job.finished);
-    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : kind == IMAGE_DIRECT ? job.whole_direct : kind == IMAGE_EMISSION ? job.emitted : kind == IMAGE_BOUNDED ? job.bounded : job.indirect;
+    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : kind == IMAGE_DIRECT || kind == IMAGE_LAMPS ? job.whole_direct : kind == IMAGE_EMISSION ? job.emitted : kind == IMAGE_BOUNDED ? job.bounded : job.indirect;
     for (int k = 0; k < 3; k++) {
         target[k] = planes.at[k];
         if (kind == IMAGE_INDIRECT_UNFILTERED) {
@@ -291,6 +293,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_RADIANCE:
     case IMAGE_EMISSION:
     case IMAGE_DIRECT:
+    case IMAGE_LAMPS:
     case IMAGE_BOUNDED:
     case IMAGE_INDIRECT:
     case IMAGE_INDIRECT_UNFILTERED: result = put_composed(renderer, kind, image); break;

@@ -7,9 +7,6 @@
 #include "gi/surface.h"
 #include "gi/vpl_visibility.h"
 
-/* 1/m², in place of the bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
-#define UNBOUNDED 1e18f
-
 void es_indirect_planes_free(es_context* context, es_indirect_planes* planes)
 {
     es_planes_free(context, &planes->irradiance);
@@ -23,13 +20,18 @@ static bool material_has_lobe(const es_material_desc* m)
     return es_surface_has_lobe(&surface) || (m->model == ES_SURFACE_METALLIC_ROUGHNESS && m->metallic_roughness_texture.image);
 }
 
+bool es_surfaces_have_lobes(const es_draw_list* list)
+{
+    for (uint32_t i = 0; i < list->instance_count; i++)
+        if (material_has_lobe(&list->materials[list->instances[i].material])) return true;
+    return false;
+}
+
 bool es_frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
 {
     for (uint32_t i = 0; i < renderer->vpl_count; i++)
         if (renderer->vpls[i].glossy) return true;
-    for (uint32_t i = 0; i < list->instance_count; i++)
-        if (material_has_lobe(&list->materials[list->instances[i].material])) return true;
-    return false;
+    return es_surfaces_have_lobes(list);
 }
 
 bool es_indirect_is_there(const es_renderer* r) { return r->plan.valid[ES_PASS_SHADING] || r->plan.valid[ES_PASS_MICRO]; }
@@ -90,7 +92,7 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
         job.spread = 0.0f;
     }
     if (s->traced_bias == ES_TRACED_UNBOUNDED) {
-        job.geometry_bound = UNBOUNDED;
+        job.geometry_bound = ES_UNBOUNDED;
         job.spread = job.lobe_roughness = 0.0f;
     }
     return result ? result : es_shade(r->context, &r->arena, &job);

@@ -4,6 +4,7 @@
 
 #include "gi/bounce_pass.h"
 #include "gi/indirect.h"
+#include "gi/lamp_passes.h"
 #include "gi/lit.h"
 #include "gi/micro/light.h"
 #include "gi/micro/photon_map.h"
@@ -15,21 +16,12 @@
 
 static bool is_micro(const es_renderer* r) { return r->settings.method == ES_GI_MICRO; }
 
-static bool something_glows(const es_draw_list* list)
-{
-    for (uint32_t i = 0; i < list->instance_count; i++) {
-        const float* e = list->materials[list->instances[i].material].emission;
-        if (e[0] > 0.0f || e[1] > 0.0f || e[2] > 0.0f) return true;
-    }
-    return false;
-}
-
 const char* es_micro_nothing(const es_frame_inputs* in, const es_renderer_settings* s)
 {
     if (s->bounces == 0) return "bounces is 0";
     if (!in->has_geometry) return "nothing to light";
     if (in->light_count) return NULL;
-    return !s->micro_emission ? "no light is on" : something_glows(in->list) ? NULL : "no light is on and nothing glows";
+    return !s->micro_emission && s->lamps == ES_LAMPS_NONE ? "no light is on" : es_something_glows(in->list) ? NULL : "no light is on and nothing glows";
 }
 
 bool es_micro_wants_photons(const es_renderer_settings* s) { return s->method == ES_GI_MICRO && s->micro_light == ES_MICRO_LIGHT_PHOTONS && s->bounces > 1; }
@@ -100,14 +92,20 @@ static es_result light_points(es_renderer* r, uint32_t bounces)
 {
     const es_renderer_settings* s = &r->frame.settings;
     if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
+    const bool lamps = es_lamps_are_there(r);
     bool glossy = false;
     for (uint32_t i = 0; i < r->micro.forest.tree_count && s->micro_lobes; i++) glossy = glossy || r->micro.forest.trees[i].glossy;
     if (glossy) es_lobe_shapes_fill(r->context, &r->micro.shapes);
     const es_point_light_job direct = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
-        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission, .lobes = &r->micro.lobes,
+        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission && !lamps, .lobes = &r->micro.lobes,
         .shapes = glossy ? &r->micro.shapes : NULL};
     es_result result = es_points_light_direct(r->context, &r->micro.forest, &direct);
     es_arena_reset(&r->arena);
+    /* photons that leave what glows bring its light to the points */
+    if (!result && lamps && !(bounces > 1 && s->micro_light == ES_MICRO_LIGHT_PHOTONS && s->micro_emission)) {
+        const es_shade_job set = es_lamps_at_points(r);
+        result = es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &set, s->micro_level, &r->micro.lobes);
+    }
     if (!result && bounces > 1) {
         const es_radiosity_job radiosity = {.level = s->micro_level, .iterations = bounces - 1, .micro = es_micro_settings_of(s), .seed = s->seed, .lobes = &r->micro.lobes};
         const es_photon_job photons = {.scene = &r->trace_scene, .photons = s->micro_photons, .bounces = bounces - 1, .seed = s->seed, .emission = s->micro_emission, .lobes = &r->micro.lobes};
@@ -127,8 +125,14 @@ static es_result pass_point_light(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
     es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
-    float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission, s->micro_lobes};
+    float numbers[] = {(float)s->shadow_filter, s->shadow_bias, s->shadow_slope_bias, s->micro_emission, s->micro_lobes, es_lamps_are_there(r)};
     es_plan_reads(plan, numbers, sizeof numbers);
+    if (es_lamps_are_there(r)) {
+        es_plan_reads_pass(plan, ES_PASS_LAMPS);
+        es_plan_reads_pass(plan, ES_PASS_LAMP_MAPS);
+        const float of_lamps[] = {s->lamp_slope_bias, in->extent, (float)s->micro_level};
+        es_plan_reads(plan, of_lamps, sizeof of_lamps);
+    }
     const uint32_t bounces = bounces_of(r);
     if (bounces > 1) {
         const es_pass read[] = {ES_PASS_VPLS, ES_PASS_ISM, ES_PASS_BOUNCES, ES_PASS_HIERARCHY};

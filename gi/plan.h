@@ -13,14 +13,19 @@
     X(SHADOW_MAPS, "shadow maps", "triangles")                                                                   \
     X(LIGHT_VIEWS, "light views", "triangles")                                                                   \
     X(VPLS, "vpls", "lights")                                                                                    \
+    X(LAMPS, "lamps", "lights")                                                                                  \
     X(POINTS, "points", "points")                                                                                \
     X(ISM, "imperfect shadow maps", "points")                                                                    \
     X(CLASSIC, "classic shadow maps", "maps")                                                                    \
     X(HIERARCHY, "ray hierarchy", "triangles")                                                                   \
+    X(LAMP_MAPS, "shadow maps of lamps", "points")                                                               \
+    X(LAMP_BOUNCE, "bounce of lamps", "lights")                                                                  \
     X(BOUNCES, "bounces", "lights")                                                                              \
     X(FOREST, "point hierarchy", "points")                                                                       \
     X(POINT_LIGHT, "point light", "points")                                                                      \
     X(DIRECT, "direct", "lights")                                                                                \
+    X(LAMP_LIGHT, "light of lamps", "samples")                                                                   \
+    X(LAMP_FILTER, "filter of lamps' light", "pixels")                                                           \
     X(SHADING, "shading", "samples")                                                                             \
     X(MICRO, "micro-buffers", "samples")                                                                         \
     X(MICRO_UPSAMPLE, "micro-buffer upsampling", "pixels gathered afresh")                                       \

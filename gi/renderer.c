@@ -7,6 +7,7 @@
 #include "gi/classic.h"
 #include "gi/direct.h"
 #include "gi/indirect.h"
+#include "gi/lamp_passes.h"
 #include "gi/lit.h"
 #include "gi/micro_passes.h"
 #include "gi/passes.h"
@@ -53,6 +54,7 @@ static es_result check_settings(es_context* context, const es_renderer_settings*
     if (!power_of_two(s->light_size)) return es_fail(context, ES_SETTING_VALUE, "vpl.light-size is %u; a power of two from 8 to 2048 is accepted", s->light_size);
     if (!power_of_two(s->ism_size)) return es_fail(context, ES_SETTING_VALUE, "ism.size is %u; 32, 64, 128 and 256 are accepted", s->ism_size);
     if (!power_of_two(s->classic_size)) return es_fail(context, ES_SETTING_VALUE, "classic.size is %u; a power of two from 32 to 1024 is accepted", s->classic_size);
+    if (!power_of_two(s->lamp_size)) return es_fail(context, ES_SETTING_VALUE, "lamps.size is %u; 32, 64, 128 and 256 are accepted", s->lamp_size);
     if (s->shadow_size % 8) return es_fail(context, ES_SETTING_VALUE, "shadow.size is %u; a multiple of 8 from 16 to 8192 is accepted", s->shadow_size);
     if (s->bounce_points % 64) return es_fail(context, ES_SETTING_VALUE, "bounce.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->bounce_points);
     if (s->ism_points % 64) return es_fail(context, ES_SETTING_VALUE, "ism.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->ism_points);
@@ -98,6 +100,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->compensation);
     es_history_free(context, &renderer->history);
     es_micro_free_planes(context, &renderer->micro);
+    es_lamps_free_planes(context, &renderer->lamps);
     es_planes_free(context, &renderer->filtered_irradiance);
     es_planes_free(context, &renderer->filtered_specular);
 }
@@ -119,6 +122,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_scene_points_free(context, &renderer->bounce_points);
     es_surfels_free(context, &renderer->surfels);
     es_ism_maps_free(context, &renderer->maps);
+    es_lamp_light_free(context, &renderer->lamps);
     es_trace_scene_free(&renderer->trace_scene);
     es_micro_free(context, &renderer->micro);
     es_arena_free(&renderer->arena);
@@ -340,34 +344,45 @@ es_result es_draw_imperfect_maps(es_renderer* r, const es_frame_inputs* in, uint
     return es_ism_maps_build(r->context, &r->maps, &job);
 }
 
-static uint32_t subset_count(const es_renderer_settings* s)
+static uint32_t subset_count(const es_renderer_settings* s, bool lamps)
 {
     uint32_t count = s->ism_pool / s->ism_points;
     uint32_t most = s->vpls ? s->vpls : 1;
+    if (lamps && s->lamp_count > most) most = s->lamp_count;
     return count < 1 ? 1 : count > most ? most : count;
+}
+
+static const char* no_maps(const es_renderer* r, const es_frame_inputs* in) { return in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing"; }
+
+static es_result pass_scene_points(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* none = no_maps(r, in);
+    const bool lamps = es_lamps_want_maps(r), points = lamps || (!none && (es_draws_imperfect_maps(s) || es_bounce_wants_points(s)));
+    if (!points) {
+        es_plan_not_needed(plan, ES_PASS_POINTS, none ? none : "gi is not ism");
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_POINTS);
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_point_request request = {s->ism_points, subset_count(s, lamps), s->ism_detail};
+    es_plan_reads(plan, &request, sizeof request);
+    if (!es_plan_run(plan, ES_PASS_POINTS)) return ES_OK;
+    uint64_t moved;
+    es_result result = es_scene_points_update(r->context, &r->points, in->list, &request, &moved);
+    if (!result) es_plan_done(plan, ES_PASS_POINTS, moved);
+    return result;
 }
 
 static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* none = in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
-    const bool imperfect = es_draws_imperfect_maps(s), points = !none && (imperfect || es_bounce_wants_points(s));
-    if (!points) es_plan_not_needed(plan, ES_PASS_POINTS, none ? none : "gi is not ism");
+    const char* none = no_maps(r, in);
+    const bool imperfect = es_draws_imperfect_maps(s);
     if (none || !imperfect) es_plan_not_needed(plan, ES_PASS_ISM, none ? none : "gi is not ism");
     if (none || s->method != ES_GI_CLASSIC) es_plan_not_needed(plan, ES_PASS_CLASSIC, none ? none : "gi is not classic");
-
-    uint32_t subsets = subset_count(s);
-    es_plan_begin(plan, ES_PASS_POINTS);
-    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
-    es_point_request request = {s->ism_points, subsets, s->ism_detail};
-    es_plan_reads(plan, &request, sizeof request);
-    if (points && es_plan_run(plan, ES_PASS_POINTS)) {
-        uint64_t moved;
-        es_result result = es_scene_points_update(r->context, &r->points, in->list, &request, &moved);
-        if (result) return result;
-        es_plan_done(plan, ES_PASS_POINTS, moved);
-    }
     if (none || (!imperfect && s->method != ES_GI_CLASSIC)) return ES_OK;
 
     /* room for all bounces: maps of later ones are added while these stand */
@@ -422,6 +437,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     const es_planes* irradiance = es_indirect_irradiance(r);
     const es_planes* specular = es_indirect_specular(r);
     job.lit = specular->lit;
+    es_lamps_compose(r, &job);
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (es_indirect_is_there(r)) job.irradiance[k] = irradiance->at[k];
@@ -439,13 +455,15 @@ static void pass_compose(es_renderer* r)
     es_plan_begin(plan, ES_PASS_COMPOSE);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_LIGHT);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_FILTER);
     es_indirect_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
     es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
-    float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL};
+    float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_COMPOSE)) return;
     job.xrgb = r->display;
@@ -463,11 +481,15 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     es_result result = pass_visibility(r, in);
     if (!result) result = pass_light_views(r, in);
     if (!result) result = pass_vpls(r, in, world, picture);
-    if (!result) result = pass_maps(r, in);
+    if (!result) result = es_pass_lamps(r, in);
+    if (!result) result = pass_scene_points(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
+    if (!result) result = es_pass_lamp_maps(r, in);
+    if (!result) result = pass_maps(r, in);
     if (!result) result = es_pass_bounces(r, in);
     if (!result) result = es_pass_points(r, in);
     if (!result) result = pass_direct(r, in);
+    if (!result) result = es_pass_lamp_light(r, in);
     if (!result) result = es_pass_shading(r, in);
     if (!result) result = es_pass_micro(r, in);
     if (!result) result = es_pass_compensation(r, in);

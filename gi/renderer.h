@@ -7,6 +7,7 @@
 #include "gi/half_resolution.h"
 #include "gi/history.h"
 #include "gi/ism.h"
+#include "gi/lamps.h"
 #include "gi/light_view.h"
 #include "gi/micro/light.h"
 #include "gi/micro/micro.h"
@@ -33,6 +34,15 @@ typedef struct es_micro_buffers {
     es_micro_stats stats;      /* of this frame */
     uint32_t turn;             /* of its buffers */
 } es_micro_buffers;
+
+/* Direct light of glowing surfaces and of the environment (gi/lamp_passes.h). */
+typedef struct es_lamp_light {
+    es_lamps set;
+    es_ism_maps maps;
+    bool has_specular;         /* something in the frame has a lobe */
+    bool filtered;
+    es_planes irradiance, specular, filtered_irradiance, filtered_specular;
+} es_lamp_light;
 
 struct es_renderer {
     es_context* context;
@@ -63,6 +73,7 @@ struct es_renderer {
     es_surfels surfels;        /* of these or of `points` */
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */
 
+    es_lamp_light lamps;
     es_trace_scene trace_scene; /* of traced methods */
     es_micro_buffers micro;
 

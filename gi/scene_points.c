@@ -3,54 +3,14 @@
 #include <string.h>
 
 #include "gi/kernel_table.h"
+#include "gi/rest_area.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
 
 /* ---- areas ------------------------------------------------------------------------------------------------------------------ */
 
-/* 7 bits of mantissa, to nearest: rotating a thing leaves the rounded numbers as they are */
-static double rounded(float x)
-{
-    uint32_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    bits = (bits + 0x8000u) & 0xffff0000u;
-    memcpy(&x, &bits, sizeof x);
-    return (double)x;
-}
-
-/* Lengths and angles that the transform makes of its axes, which is all that areas depend on. The sum of squares keeps 7 bits, the parts
- * are multiples of 1/3072 of it: the third that each has where nothing is stretched is one. */
-static void gram_of(const es_mat4* transform, double gram[6])
-{
-    const float* m = transform->m;
-    const es_vec3 x = es_v3(m[0], m[1], m[2]), y = es_v3(m[4], m[5], m[6]), z = es_v3(m[8], m[9], m[10]);
-    const float parts[6] = {es_v3_dot(x, x), es_v3_dot(y, y), es_v3_dot(z, z), es_v3_dot(x, y), es_v3_dot(x, z), es_v3_dot(y, z)};
-    const float sum = parts[0] + parts[1] + parts[2];
-    memset(gram, 0, 6 * sizeof *gram);
-    if (!(sum > 1e-30f && sum < 1e30f)) return;
-    for (int k = 0; k < 6; k++) gram[k] = (double)(int32_t)(parts[k] / sum * 3072.0f + (parts[k] < 0.0f ? -0.5f : 0.5f)) * (rounded(sum) / 3072.0);
-}
-
-static double dot(const double gram[6], const double a[3], const double b[3])
-{
-    return gram[0] * a[0] * b[0] + gram[1] * a[1] * b[1] + gram[2] * a[2] * b[2] + gram[3] * (a[0] * b[1] + a[1] * b[0]) + gram[4] * (a[0] * b[2] + a[2] * b[0]) +
-        gram[5] * (a[1] * b[2] + a[2] * b[1]);
-}
-
 static double root(double x) { return x > 0.0 ? __builtin_sqrt(x) : 0.0; }
-
-static double triangle_area(const float* positions, const uint32_t* index, const double gram[6])
-{
-    const float *a = positions + 4 * (size_t)index[0], *b = positions + 4 * (size_t)index[1], *c = positions + 4 * (size_t)index[2];
-    double u[3], v[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = (double)b[k] - (double)a[k];
-        v[k] = (double)c[k] - (double)a[k];
-    }
-    const double uv = dot(gram, u, v), area = 0.5 * root(dot(gram, u, u) * dot(gram, v, v) - uv * uv);
-    return area < 1e30 ? area : 0.0;
-}
 
 typedef struct measuring { const es_raster_mesh* mesh; const double* gram; double *rest, *now; } measuring;
 
@@ -59,8 +19,8 @@ static void measure(void* user, uint32_t begin, uint32_t end, uint32_t worker)
     const measuring* job = user;
     const es_raster_mesh* mesh = job->mesh;
     for (uint32_t t = begin; t < end; t++) {
-        job->rest[t] = triangle_area(mesh->rest_positions ? mesh->rest_positions : mesh->positions, mesh->indices + 3 * (size_t)t, job->gram);
-        if (mesh->rest_positions) job->now[t] = triangle_area(mesh->positions, mesh->indices + 3 * (size_t)t, job->gram);
+        job->rest[t] = es_area_by_gram(mesh->rest_positions ? mesh->rest_positions : mesh->positions, mesh->indices + 3 * (size_t)t, job->gram);
+        if (mesh->rest_positions) job->now[t] = es_area_by_gram(mesh->positions, mesh->indices + 3 * (size_t)t, job->gram);
     }
 }
 
@@ -287,7 +247,7 @@ static es_result examine(es_context* context, es_point_source* source, const es_
     *need = same_mesh && memcmp(&source->transform, &instance->transform, sizeof source->transform) == 0 ? AS_IT_WAS : MOVED;
     if (*need == AS_IT_WAS && source->point_weight == instance->point_weight) return ES_OK;
     double gram[6];
-    gram_of(&instance->transform, gram);
+    es_gram_of(&instance->transform, gram);
     const bool same_areas = same_mesh && memcmp(gram, source->gram, sizeof gram) == 0;
     const uint64_t areas = source->areas;
     source->mesh = mesh;

@@ -69,7 +69,14 @@ static const es_setting renderer_table[] = {
     {"micro.iterations", ES_SETTING_INT, "0", 0, 64, NULL, "micro.light radiosity: times that it is gathered; 0: bounces - 1", AT(micro_iterations)},
     {"micro.photons", ES_SETTING_INT, "262144", 1, 16777216, NULL, "micro.light photons: sent from all lights", AT(micro_photons)},
     {"micro.rebuild", ES_SETTING_FLOAT, "1.5", 1, 1000, NULL, "how much worse than new a deforming mesh's tree of points may be before it is built anew", AT(micro_rebuild)},
-    {"micro.emission", ES_SETTING_BOOL, "true", 0, 1, NULL, "glowing surfaces send light", AT(micro_emission)},
+    {"micro.emission", ES_SETTING_BOOL, "true", 0, 1, NULL, "glowing surfaces send light to micro-buffers; with lamps other than none they do not: their light is direct", AT(micro_emission)},
+
+    {"lamps", ES_SETTING_CHOICE, "maps", 0, 0, "none|maps|traced", "direct light of glowing surfaces and of the environment: none, of a set of lights with imperfect shadow maps, or with rays", AT(lamps)},
+    {"lamps.count", ES_SETTING_INT, "512", 1, 16384, NULL, "lights that stand for all glowing surfaces and the environment", AT(lamp_count)},
+    {"lamps.size", ES_SETTING_INT, "128", 32, 256, NULL, "texels of a side of a lamp's imperfect shadow map: 32, 64, 128 or 256", AT(lamp_size)},
+    {"lamps.interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern of lamps' light", AT(lamp_interleave)},
+    {"lamps.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "lobes sharper than this are widened to it, or each of a lamp's lights would show as a spot", AT(lamp_roughness)},
+    {"lamps.slope-bias", ES_SETTING_FLOAT, "0.026", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(lamp_slope_bias)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
     {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent; n is interleave, with gi micro micro.filter", AT(filter_passes)},

@@ -34,6 +34,9 @@
 
 enum { ES_INTERLEAVE_MAX = 16 };
 
+/* 1/m², for es_shade_job.geometry_bound where there is to be none: finite, so that a light on a pixel's very point gives no infinity */
+#define ES_UNBOUNDED 1e18f
+
 typedef struct es_shade_batch es_shade_batch;
 typedef struct es_shade_visibility es_shade_visibility;
 

@@ -1,6 +1,7 @@
 /* Passes of methods that trace rays: the hierarchy they go through, and what the bias of virtual point lights leaves out. */
 #include "gi/bias_compensation.h"
 #include "gi/bounce_pass.h"
+#include "gi/lamp_passes.h"
 #include "gi/micro_passes.h"
 #include "gi/renderer.h"
 #include "gi/vpl_visibility.h"
@@ -12,7 +13,7 @@ es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world*
     const es_renderer_settings* s = &r->settings;
     const bool photons = es_micro_wants_photons(s), lights = s->method != ES_GI_MICRO && (s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED || s->traced_bias == ES_TRACED_COMPENSATED ||
         (s->near_distance > 0.0f && s->traced_bias == ES_TRACED_BOUNDED));
-    const char* why = photons ? in->no_indirect : !lights && !es_bounce_wants_rays(s) ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
+    const char* why = es_lamps_want_rays(r) ? NULL : photons ? in->no_indirect : !lights && !es_bounce_wants_rays(s) ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_HIERARCHY, why);
         es_trace_scene_free(&r->trace_scene);
@@ -22,7 +23,7 @@ es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world*
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
     es_plan_reads(plan, &in->revisions.lights, sizeof in->revisions.lights);
-    const bool emission = photons && s->micro_emission;
+    const bool emission = photons && !in->no_indirect && s->micro_emission;
     es_plan_reads(plan, &emission, sizeof emission);
     if (!es_plan_run(plan, ES_PASS_HIERARCHY)) return ES_OK;
     es_result result = es_trace_scene_take(&r->trace_scene, world, emission);

@@ -1,0 +1,201 @@
+#include "gi/lamp_passes.h"
+
+#include "gi/filter.h"
+#include "gi/indirect.h"
+#include "gi/passes.h"
+#include "gi/vpl_visibility.h"
+
+/* Close by, a light is a disc of the area that it stands for. */
+#define LAMP_SPREAD 1.0f
+
+static const char* no_lamps(const es_renderer* r, const es_frame_inputs* in)
+{
+    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : !es_something_glows(in->list) ? "nothing glows" : NULL;
+}
+
+es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = no_lamps(r, in);
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_LAMPS, why);
+        es_lamps_free(r->context, &r->lamps.set);
+        return ES_OK;
+    }
+    const es_lamp_request request = {.list = in->list, .materials = in->revisions.materials, .count = s->lamp_count, .subsets = s->lamp_interleave * s->lamp_interleave, .seed = s->seed, .extent = in->extent};
+    es_plan_begin(plan, ES_PASS_LAMPS);
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
+    const uint32_t words[] = {request.count, request.subsets, request.seed};
+    es_plan_reads(plan, words, sizeof words);
+    es_plan_reads(plan, &in->extent, sizeof in->extent);
+    if (!es_plan_run(plan, ES_PASS_LAMPS)) return ES_OK;
+    es_result result = es_lamps_update(r->context, &r->lamps.set, &request);
+    if (!result) es_plan_done(plan, ES_PASS_LAMPS, r->lamps.set.count);
+    return result;
+}
+
+/* Why there is no light of lamps, once they are placed. */
+static const char* no_light(const es_renderer* r, const es_frame_inputs* in)
+{
+    const char* why = no_lamps(r, in);
+    return why ? why : !r->lamps.set.count ? "what glows is black" : NULL;
+}
+
+bool es_lamps_are_there(const es_renderer* r) { return r->plan.valid[ES_PASS_LAMPS] && r->lamps.set.count; }
+bool es_lamps_want_rays(const es_renderer* r) { return r->settings.lamps == ES_LAMPS_TRACED && es_lamps_are_there(r); }
+
+/* Points that micro-buffers see are lit by maps, whatever the pixels are. */
+bool es_lamps_want_maps(const es_renderer* r) { return es_lamps_are_there(r) && (r->settings.lamps == ES_LAMPS_MAPS || r->settings.method == ES_GI_MICRO); }
+
+es_result es_pass_lamp_maps(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = no_light(r, in);
+    if (!why && !es_lamps_want_maps(r)) why = "lamps is traced";
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_LAMP_MAPS, why);
+        es_ism_maps_free(r->context, &r->lamps.maps);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_LAMP_MAPS);
+    es_plan_reads_pass(plan, ES_PASS_LAMPS);
+    es_plan_reads_pass(plan, ES_PASS_POINTS);
+    const float numbers[] = {(float)s->lamp_size, s->pull_push, s->pull_threshold, s->push_threshold, (float)s->pull_push_levels, in->extent};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_LAMP_MAPS)) return ES_OK;
+    const es_lamps* set = &r->lamps.set;
+    const es_ism_job job = {.vpls = set->records, .vpl_count = set->count, .room = set->count, .points = &r->points, .size = s->lamp_size, .far_distance = in->extent, .near_distance = es_near_distance(in),
+        .pull_push = s->pull_push, .pull_threshold = s->pull_threshold, .push_threshold = s->push_threshold, .pull_push_levels = s->pull_push_levels, .keep = s->skip, .kept_bytes = (size_t)s->ism_kept << 20};
+    es_result result = es_ism_maps_build(r->context, &r->lamps.maps, &job);
+    if (!result) es_plan_done(plan, ES_PASS_LAMP_MAPS, r->lamps.maps.kept.splats);
+    return result;
+}
+
+es_shade_job es_lamps_at_points(const es_renderer* r)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    const es_lamp_light* lamps = &r->lamps;
+    return (es_shade_job){.vpls = lamps->set.records, .vpl_count = lamps->set.count, .maps = lamps->maps.texels, .map_size = lamps->maps.size, .far_distance = lamps->maps.far_distance,
+        .slope_bias = s->lamp_slope_bias * r->frame.extent, .spread = LAMP_SPREAD, .geometry_bound = ES_UNBOUNDED, .lobe_roughness = s->lamp_roughness, .interleave = 1};
+}
+
+static es_result shade(es_renderer* r, const es_frame_inputs* in)
+{
+    const es_renderer_settings* s = &r->settings;
+    es_lamp_light* lamps = &r->lamps;
+    es_result result = es_planes_resize(r->context, &lamps->irradiance, &r->gbuffer);
+    if (!result && lamps->has_specular) result = es_planes_resize(r->context, &lamps->specular, &r->gbuffer);
+    if (result) return result;
+    es_shade_job job = es_lamps_at_points(r);
+    job.gbuffer = &r->gbuffer;
+    job.rays = r->rays;
+    job.interleave = s->lamp_interleave;
+    job.seed = s->seed;
+    for (int k = 0; k < 3; k++) {
+        job.irradiance[k] = lamps->irradiance.at[k];
+        job.specular[k] = lamps->has_specular ? lamps->specular.at[k] : NULL;
+    }
+    job.lit = lamps->has_specular ? lamps->specular.lit : NULL;
+    es_arena_reset(&r->arena);
+    es_vpl_visibility visibility;
+    if (es_lamps_want_rays(r)) {
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, lamps->set.records, lamps->set.count, in->extent, &visibility);
+        job.visibility = &visibility.shade;
+        job.maps = NULL;
+    }
+    return result ? result : es_shade(r->context, &r->arena, &job);
+}
+
+static es_result filter(es_renderer* r)
+{
+    const es_renderer_settings* s = &r->settings;
+    es_lamp_light* lamps = &r->lamps;
+    es_result result = es_planes_resize(r->context, &lamps->filtered_irradiance, &r->gbuffer);
+    if (!result && lamps->has_specular) result = es_planes_resize(r->context, &lamps->filtered_specular, &r->gbuffer);
+    if (result) return result;
+    es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->lamp_interleave, .passes = s->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = lamps->has_specular ? 6 : 3,
+        .source_lit = lamps->specular.lit, .result_lit = lamps->filtered_specular.lit};
+    for (int k = 0; k < 3; k++) {
+        job.source[k] = lamps->irradiance.at[k];
+        job.result[k] = lamps->filtered_irradiance.at[k];
+        job.source[k + 3] = lamps->specular.at[k];
+        job.result[k + 3] = lamps->filtered_specular.at[k];
+    }
+    es_arena_reset(&r->arena);
+    return es_filter_geometry_aware(r->context, &r->arena, &job);
+}
+
+static es_result pass_filter(es_renderer* r, const char* nothing)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = nothing ? nothing : !s->filter_passes ? "filter.passes is 0" : s->lamp_interleave == 1 ? "lamps.interleave is 1: nothing to smooth" : NULL;
+    r->lamps.filtered = !why;
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_LAMP_FILTER, why);
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_LAMP_FILTER);
+    es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_LIGHT);
+    const float numbers[] = {s->filter_depth, s->filter_normal, (float)s->lamp_interleave, r->lamps.has_specular, (float)s->filter_passes};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (!es_plan_run(plan, ES_PASS_LAMP_FILTER)) return ES_OK;
+    es_result result = filter(r);
+    if (!result) es_plan_done(plan, ES_PASS_LAMP_FILTER, (uint64_t)r->gbuffer.width * r->gbuffer.height * s->filter_passes);
+    return result;
+}
+
+es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    const char* why = no_light(r, in);
+    if (why) {
+        es_plan_not_needed(plan, ES_PASS_LAMP_LIGHT, why);
+        es_lamps_free_planes(r->context, &r->lamps);
+        return pass_filter(r, why);
+    }
+    r->lamps.has_specular = es_surfaces_have_lobes(in->list);
+    es_plan_begin(plan, ES_PASS_LAMP_LIGHT);
+    const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
+    for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
+    const float numbers[] = {s->lamp_slope_bias, s->lamp_roughness, (float)s->lamp_interleave, in->extent, r->lamps.has_specular, (float)s->lamps};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {
+        es_result result = shade(r, in);
+        if (result) return result;
+        es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->lamps.set.count / (s->lamp_interleave * s->lamp_interleave));
+    }
+    return pass_filter(r, NULL);
+}
+
+void es_lamps_compose(const es_renderer* r, es_compose_job* job)
+{
+    if (!r->plan.valid[ES_PASS_LAMP_LIGHT]) return;
+    const es_lamp_light* lamps = &r->lamps;
+    const es_planes *irradiance = lamps->filtered ? &lamps->filtered_irradiance : &lamps->irradiance, *specular = lamps->filtered ? &lamps->filtered_specular : &lamps->specular;
+    for (int k = 0; k < 3; k++) {
+        job->lamp_irradiance[k] = irradiance->at[k];
+        job->lamp_specular[k] = lamps->has_specular ? specular->at[k] : NULL;
+    }
+    job->lamp_lit = lamps->has_specular ? specular->lit : NULL;
+}
+
+void es_lamps_free_planes(es_context* context, es_lamp_light* lamps)
+{
+    es_planes_free(context, &lamps->irradiance);
+    es_planes_free(context, &lamps->specular);
+    es_planes_free(context, &lamps->filtered_irradiance);
+    es_planes_free(context, &lamps->filtered_specular);
+}
+
+void es_lamp_light_free(es_context* context, es_lamp_light* lamps)
+{
+    es_lamps_free_planes(context, lamps);
+    es_ism_maps_free(context, &lamps->maps);
+    es_lamps_free(context, &lamps->set);
+}

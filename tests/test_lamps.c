@@ -1,0 +1,328 @@
+/* Direct light of glowing surfaces by sets of lights: form factors in closed form, where the lights stand, and what may be skipped. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "gi/lamps.h"
+#include "gi/plan.h"
+#include "tests/form_factors.h"
+#include "tests/small_worlds.h"
+
+enum { SIZE = 16 };
+static const float radiance = 3, albedo = 0.6f;
+
+static es_renderer_settings settings_of(uint32_t lamps)
+{
+    es_renderer_settings s = es_default_renderer_settings();
+    s.method = ES_GI_NONE;
+    s.width = s.height = SIZE;
+    s.lamps = lamps;
+    s.lamp_count = 256;
+    s.lamp_size = 64;
+    s.lamp_interleave = 1;
+    s.ism_points = 1024;
+    s.ism_pool = 16384;
+    return s;
+}
+
+static es_renderer* renderer_of(const small_world* w, const es_renderer_settings* s)
+{
+    es_renderer* renderer;
+    assert_int_equal(es_renderer_create(w->context, s, &renderer), ES_OK);
+    return renderer;
+}
+
+static es_image image_of(const small_world* w, es_renderer* renderer, const char* name)
+{
+    es_image image;
+    assert_int_equal(es_renderer_render(renderer, w->world), ES_OK);
+    assert_int_equal(es_renderer_image(renderer, name, &image), ES_OK);
+    return image;
+}
+
+static es_image rendered(const small_world* w, const es_renderer_settings* s, const char* name)
+{
+    es_renderer* renderer = renderer_of(w, s);
+    es_image image = image_of(w, renderer, name);
+    es_renderer_destroy(renderer);
+    return image;
+}
+
+static void assert_same_image(const es_image* a, const es_image* b)
+{
+    assert_int_equal(a->width * a->height * a->channels, b->width * b->height * b->channels);
+    assert_memory_equal(a->pixels, b->pixels, (size_t)a->width * a->height * a->channels * sizeof(float));
+}
+
+static double brightness(const es_image* image)
+{
+    double sum = 0;
+    for (size_t i = 0; i < (size_t)image->width * image->height * 3; i++) sum += (double)image->pixels[i];
+    return sum;
+}
+
+/* ---- form factors ----------------------------------------------------------------------------------------------------------------- */
+
+/* A floor of 3 m, seen from above through the backs of what glows. */
+static void add_floor(small_world* w)
+{
+    es_material_desc grey = lambert(albedo, 0);
+    add_rectangle(w, es_v3(-1.5f, 0, 1.5f), es_v3(3, 0, 0), es_v3(0, 0, -3), &grey);
+}
+
+typedef double (*form_factor)(es_vec3 point);
+
+static double of_rectangle(es_vec3 p)
+{
+    static const es_vec3 corners[4] = {{-0.4f, 0.8f, -0.25f}, {0.4f, 0.8f, -0.25f}, {0.4f, 0.8f, 0.25f}, {-0.4f, 0.8f, 0.25f}};
+    return point_to_polygon(p, es_v3(0, 1, 0), corners, 4);
+}
+
+/* Howell's B-13, a disc of radius R parallel to a plane element at height h and distance a from its axis. */
+static double of_disc(es_vec3 p)
+{
+    const double h = 0.7, r = 0.45, a = sqrt((double)p.x * (double)p.x + (double)p.z * (double)p.z), H = h * h + a * a + r * r;
+    return 0.5 * (1 - (H - 2 * r * r) / sqrt(H * H - 4 * a * a * r * r));
+}
+
+static double of_sphere(es_vec3 p)
+{
+    const double x = (double)p.x, z = (double)p.z, h = 0.9, d = sqrt(x * x + z * z + h * h);
+    return point_to_sphere(0.3, d, acos(h / d));
+}
+
+static void add_disc(small_world* w, float height, float radius, const es_material_desc* material)
+{
+    enum { SIDES = 96 };
+    float p[3 * (SIDES + 1)] = {0, height, 0};
+    uint32_t index[3 * SIDES];
+    for (uint32_t i = 0; i < SIDES; i++) {
+        const float a = 2 * ES_PI * (float)i / SIDES;
+        p[3 * i + 3] = radius * es_cos(a);
+        p[3 * i + 4] = height;
+        p[3 * i + 5] = radius * es_sin(a);
+        index[3 * i] = 0; /* facing down */
+        index[3 * i + 1] = 1 + i;
+        index[3 * i + 2] = 1 + (i + 1) % SIDES;
+    }
+    add_instance(w, &(es_mesh_desc){.vertex_count = SIDES + 1, .triangle_count = SIDES, .positions = p, .indices = index, .flat_normals = true}, material);
+}
+
+static void check_floor(small_world* w, form_factor factor, double share, double worst, const char* what)
+{
+    static const uint32_t ways[] = {ES_LAMPS_TRACED, ES_LAMPS_MAPS};
+    es_camera_desc camera = es_default_camera_desc();
+    camera.orthographic = true;
+    camera.half_height = 1.4f;
+    camera.near_plane = 0.01f;
+    camera.far_plane = 0.4f;
+    look(w, camera, es_v3(0, 0.3f, 0), es_v3(0, 0, 0));
+    for (size_t k = 0; k < 2; k++) {
+        es_renderer_settings s = settings_of(ways[k]);
+        es_image image = rendered(w, &s, "lamps");
+        double sum = 0, all = 0;
+        for (uint32_t y = 0; y < SIZE; y++)
+            for (uint32_t x = 0; x < SIZE; x++) {
+                const double expected = factor(pixel_on_plane(w, SIZE, SIZE, x, y, es_v3(0, 0, 0), es_v3(0, 1, 0))) * (double)(radiance * albedo) * share, found = (double)image.pixels[3 * (y * SIZE + x)];
+                sum += found;
+                all += expected;
+                if (!(fabs(found - expected) <= worst * expected)) fail_msg("%s, lamps %u, pixel %u %u: %.6f, expected %.6f", what, ways[k], x, y, found, expected);
+            }
+        if (!(fabs(sum - all) <= 5e-3 * all)) fail_msg("%s, lamps %u: %.6f in all, expected %.6f", what, ways[k], sum, all);
+        es_image_destroy(w->context, &image);
+    }
+}
+
+/* Lights are discs of their share of the area, which is what differs from the form factor near them; the horizon of a sphere cuts through some. */
+static void test_form_factors(void** state)
+{
+    (void)state;
+    es_material_desc glowing = lambert(0, radiance);
+    small_world w = small_world_create();
+    add_floor(&w);
+    add_rectangle(&w, es_v3(-0.4f, 0.8f, -0.25f), es_v3(0.8f, 0, 0), es_v3(0, 0, 0.5f), &glowing);
+    check_floor(&w, of_rectangle, 1, 0.02, "rectangle");
+    small_world_destroy(&w);
+
+    w = small_world_create();
+    add_floor(&w);
+    add_disc(&w, 0.7f, 0.45f, &glowing);
+    check_floor(&w, of_disc, 1, 0.03, "disc");
+    small_world_destroy(&w);
+
+    w = small_world_create();
+    add_floor(&w);
+    add_sphere(&w, es_v3(0, 0.9f, 0), 0.3f, 32, false, &glowing);
+    check_floor(&w, of_sphere, 1, 0.03, "sphere");
+    small_world_destroy(&w);
+
+    /* its back lights the floor as its front does where both sides glow, and not where one does */
+    w = small_world_create();
+    add_floor(&w);
+    glowing.double_sided = true;
+    add_rectangle(&w, es_v3(-0.4f, 0.8f, 0.25f), es_v3(0.8f, 0, 0), es_v3(0, 0, -0.5f), &glowing);
+    check_floor(&w, of_rectangle, 1, 0.02, "back of a rectangle");
+    small_world_destroy(&w);
+    w = small_world_create();
+    add_floor(&w);
+    glowing.double_sided = false;
+    add_rectangle(&w, es_v3(-0.4f, 0.8f, 0.25f), es_v3(0.8f, 0, 0), es_v3(0, 0, -0.5f), &glowing);
+    check_floor(&w, of_rectangle, 0, 0, "dark side of a rectangle");
+    small_world_destroy(&w);
+}
+
+/* ---- the set ------------------------------------------------------------------------------------------------------------------------ */
+
+static es_lamp_request request_of(small_world* w, uint32_t count)
+{
+    return (es_lamp_request){.list = es_world_draw_list(w->world), .materials = es_world_get_revisions(w->world).materials, .count = count, .subsets = 16, .extent = 3};
+}
+
+/* A sheet of which the left half is red and the right one green and twice as bright, stretched over an area of 2 m². */
+static void add_two_colours(small_world* w, es_node* node)
+{
+    const uint8_t texels[2 * 4] = {100, 0, 0, 255, 0, 200, 0, 255};
+    es_texture texture;
+    assert_int_equal(es_world_add_texture(w->world, &(es_texture_desc){.width = 2, .height = 1, .rgba = texels}, &texture), ES_OK);
+    es_material_desc desc = lambert(0, 5);
+    desc.emission_texture.image = es_world_texture_image(w->world, texture);
+    desc.emission_texture.magnify = desc.emission_texture.minify = ES_FILTER_NEAREST;
+    static const float positions[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, uvs[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    es_mesh mesh;
+    es_material material;
+    es_instance instance;
+    assert_int_equal(es_world_add_mesh(w->world, &(es_mesh_desc){.vertex_count = 4, .triangle_count = 2, .positions = positions, .uv0 = uvs, .indices = indices, .flat_normals = true}, &mesh), ES_OK);
+    assert_int_equal(es_world_add_material(w->world, "", &desc, &material), ES_OK);
+    assert_int_equal(es_world_add_node(w->world, &(es_node_desc){.transform = {{0, 1, 0}, {0, 0, 0, 1}, {2, 1, 1}}}, node), ES_OK);
+    assert_int_equal(es_world_add_instance(w->world, &(es_instance_desc){.mesh = mesh, .material = material, .node = *node}, &instance), ES_OK);
+}
+
+static void test_places(void** state)
+{
+    (void)state;
+    enum { LIGHTS = 64 };
+    small_world w = small_world_create();
+    es_node node;
+    add_two_colours(&w, &node);
+    assert_int_equal(es_world_step(w.world, 0), ES_OK);
+    es_lamps lamps = {0};
+    es_lamp_request request = request_of(&w, LIGHTS);
+    assert_int_equal(es_lamps_update(w.context, &lamps, &request), ES_OK);
+    assert_int_equal(lamps.count, LIGHTS);
+    double sum[3] = {0, 0, 0};
+    es_vec3 before[LIGHTS];
+    for (uint32_t v = 0; v < LIGHTS; v++) {
+        const es_vpl_record* r = &lamps.records[v];
+        /* its colour is that of its place */
+        if (r->position[0] < 0.99f) assert_true(r->flux[0] > 0 && r->flux[1] == 0);
+        if (r->position[0] > 1.01f) assert_true(r->flux[1] > 0 && r->flux[0] == 0);
+        assert_true(r->normal[2] > 0.999f && r->position[2] > 0 && r->position[2] < 1e-3f);
+        for (int k = 0; k < 3; k++) sum[k] += (double)r->flux[k];
+        before[v] = es_v3(r->position[0], r->position[1], r->position[2]);
+    }
+    /* pi L A of each half; green has 0.7152 · 200 of 0.2126 · 100 + 0.7152 · 200 of the luminance, to a light */
+    assert_true(fabs(sum[0] - pi * 5 * 100 / 255) < 0.07 * pi * 5 * 100 / 255);
+    assert_true(fabs(sum[1] - pi * 5 * 200 / 255) < 0.02 * pi * 5 * 200 / 255);
+    assert_true(sum[2] == 0);
+
+    /* they go along, and each subset of the pattern has both colours' share */
+    assert_int_equal(es_world_set_node_transform(w.world, node, &(es_transform){{0.5f, 2, 1}, es_quat_from_axis_angle(es_v3(0, 0, 1), ES_PI / 2), {2, 1, 1}}), ES_OK);
+    assert_int_equal(es_world_step(w.world, 0.1), ES_OK);
+    request = request_of(&w, LIGHTS);
+    assert_int_equal(es_lamps_update(w.context, &lamps, &request), ES_OK);
+    for (uint32_t v = 0; v < LIGHTS; v++) {
+        const es_vpl_record* r = &lamps.records[v];
+        assert_true(fabsf(r->position[0] - (0.5f - (before[v].y - 1))) < 1e-5f && fabsf(r->position[1] - (2 + before[v].x)) < 1e-5f);
+    }
+    for (uint32_t subset = 0; subset < 16; subset++) {
+        uint32_t green = 0;
+        for (uint32_t v = subset; v < LIGHTS; v += 16) green += lamps.records[v].flux[1] > 0;
+        assert_true(green >= 2);
+    }
+    es_lamps_free(w.context, &lamps);
+    small_world_destroy(&w);
+}
+
+/* ---- frames ------------------------------------------------------------------------------------------------------------------------- */
+
+static void add_scene(small_world* w, es_node* node)
+{
+    add_floor(w);
+    if (node) add_two_colours(w, node);
+    es_material_desc grey = lambert(0.5f, 0);
+    add_sphere(w, es_v3(0.4f, 0.3f, 0.6f), 0.3f, 8, false, &grey);
+    look(w, es_default_camera_desc(), es_v3(0, 1.5f, 4), es_v3(0, 0.7f, 0));
+}
+
+/* What a renderer shows after a lamp has moved is what one shows that never saw it elsewhere, whether it skips work or not. */
+static void test_moving_lamp(void** state)
+{
+    (void)state;
+    static const uint32_t ways[] = {ES_LAMPS_MAPS, ES_LAMPS_TRACED};
+    for (size_t k = 0; k < 2; k++) {
+        small_world w = small_world_create();
+        es_node node;
+        add_scene(&w, &node);
+        es_renderer_settings s = settings_of(ways[k]);
+        s.method = k ? ES_GI_NONE : ES_GI_MICRO;
+        s.micro_points = 4096;
+        s.lamp_interleave = 4;
+        es_renderer* skips = renderer_of(&w, &s);
+        s.skip = false;
+        es_renderer* repeats = renderer_of(&w, &s);
+        for (int frame = 0; frame < 4; frame++) {
+            if (frame % 2) assert_int_equal(es_world_set_node_transform(w.world, node, &(es_transform){{-1, 1 + 0.2f * (float)frame, 0}, {0, 0, 0, 1}, {2, 1, 1}}), ES_OK);
+            assert_int_equal(es_world_step(w.world, 0), ES_OK);
+            es_image a = image_of(&w, skips, "radiance"), b = image_of(&w, repeats, "radiance"), c = rendered(&w, &s, "radiance");
+            assert_same_image(&a, &b);
+            assert_same_image(&a, &c);
+            assert_true(brightness(&a) > 0);
+            es_image_destroy(w.context, &a);
+            es_image_destroy(w.context, &b);
+            es_image_destroy(w.context, &c);
+        }
+        es_renderer_destroy(skips);
+        es_renderer_destroy(repeats);
+        small_world_destroy(&w);
+    }
+}
+
+/* Where nothing glows, or only blackly, the passes are skipped and say why, and the picture has the bits that it has without them. */
+static void test_nothing_glows(void** state)
+{
+    (void)state;
+    small_world w = small_world_create();
+    add_scene(&w, NULL);
+    es_light_desc lamp = es_default_light_desc();
+    add_light(&w, lamp, es_v3(0, 2, 1), es_v3(0, -1, 0));
+    assert_int_equal(es_world_step(w.world, 0), ES_OK);
+    es_renderer_settings s = settings_of(ES_LAMPS_MAPS), none = settings_of(ES_LAMPS_NONE);
+    es_renderer* renderer = renderer_of(&w, &s);
+    es_image a = image_of(&w, renderer, "radiance"), b = rendered(&w, &none, "radiance");
+    assert_same_image(&a, &b);
+    const es_frame_stats* stats = es_renderer_stats(renderer);
+    assert_string_equal(stats->passes[ES_PASS_LAMPS].skipped, "nothing glows");
+    assert_string_equal(stats->passes[ES_PASS_LAMP_MAPS].skipped, "nothing glows");
+    assert_string_equal(stats->passes[ES_PASS_LAMP_LIGHT].skipped, "nothing glows");
+    es_renderer_destroy(renderer);
+    es_image_destroy(w.context, &a);
+    es_image_destroy(w.context, &b);
+    small_world_destroy(&w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_form_factors),
+        cmocka_unit_test(test_places),
+        cmocka_unit_test(test_moving_lamp),
+        cmocka_unit_test(test_nothing_glows),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
