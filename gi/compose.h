@@ -19,12 +19,13 @@ typedef enum es_further_light {
     ES_FURTHER_LIGHTS
 } es_further_light;
 
-/* radiance = (emitted + direct) + indirect,
+/* radiance = (emitted + direct) + indirect, the background being emitted,
  * direct = that of light sources without a size + that of lamps,
  * indirect = ((bounded + further[0]) + further[1]) + …, bounded = diffuse + lobe; what is NULL is left out.
  * The sums are what stands here, in this order, so that the parts' images add up to the whole's to the bit. */
 typedef struct es_compose_job {
     const es_gbuffer* gbuffer;
+    const float* background[3];   /* radiance where nothing is seen, 0 elsewhere; NULL: none */
     const float* direct[3];       /* reflected radiance; NULL: none */
     const float* lamp_irradiance[3]; /* direct irradiance of lamps on the diffuse part, NULL: none */
     const float* lamp_specular[3];   /* their radiance reflected by the lobe, NULL: none */

@@ -11,7 +11,7 @@
 
 typedef enum image_kind {
     IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
-    IMAGE_MOTION, IMAGE_EMISSION, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
+    IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
@@ -32,7 +32,8 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},
     {IMAGE_DEPTH, "depth", "distance along the view axis, metres; 0 where nothing is"},
     {IMAGE_MOTION, "motion", "pixel position now minus last frame's"},
-    {IMAGE_EMISSION, "emission", "emitted radiance and the colour of what is unlit, W/(m² sr)"},
+    {IMAGE_EMISSION, "emission", "emitted radiance, the colour of what is unlit and the background, W/(m² sr)"},
+    {IMAGE_BACKGROUND, "background", "the environment where nothing is seen, W/(m² sr)"},
     {IMAGE_METALLIC, "metallic", "0 to 1"},
     {IMAGE_ROUGHNESS, "roughness", "0 to 1; Phong surfaces: exponent / 50"},
     {IMAGE_SPECULAR, "specular", "weight of the specular lobe, 0 to 1"},
@@ -299,9 +300,10 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_INDIRECT_UNFILTERED: result = put_composed(renderer, kind, image); break;
     case IMAGE_BOUNCE: result = es_bounce_image(renderer, bounce_of(name), image); break;
     case IMAGE_IRRADIANCE:
+    case IMAGE_BACKGROUND:
     case IMAGE_COMPENSATION: {
         es_compose_job job = es_renderer_compose_job(renderer);
-        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : job.further[ES_FURTHER_RAYS];
+        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[ES_FURTHER_RAYS];
         if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }

@@ -3,6 +3,7 @@
 #define EARTHSHINE_GI_KERNEL_TABLE_H
 
 #include "gi/antialias.h"
+#include "gi/background.h"
 #include "gi/bounces.h"
 #include "gi/compose.h"
 #include "gi/direct.h"
@@ -73,6 +74,7 @@
     /* rows [row_begin, row_end) of a level */                                                                    \
     X(environment_lobes, (const es_environment_lobe_job* job, uint32_t row_begin, uint32_t row_end))              \
     X(environment_irradiance, (const es_environment_irradiance_job* job, uint32_t row_begin, uint32_t row_end))   \
+    X(background, (const es_background_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(environment_ask, (const es_environment_lookup* lookup, const es_environment_question* question))
 
 struct es_gi_kernels {

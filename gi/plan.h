@@ -10,6 +10,8 @@
 
 #define ES_PASSES(X)                                                                                             \
     X(VISIBILITY, "visibility", "triangles")                                                                     \
+    X(BACKGROUND, "background", "pixels")                                                                        \
+    X(ENVIRONMENT, "environment", "texels")                                                                      \
     X(SHADOW_MAPS, "shadow maps", "triangles")                                                                   \
     X(LIGHT_VIEWS, "light views", "triangles")                                                                   \
     X(VPLS, "vpls", "lights")                                                                                    \

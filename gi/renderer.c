@@ -94,6 +94,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_gbuffer_destroy(context, &renderer->half);
     es_planes_free(context, &renderer->upsampled_irradiance);
     es_planes_free(context, &renderer->upsampled_specular);
+    es_planes_free(context, &renderer->background);
     es_planes_free(context, &renderer->direct);
     es_planes_free(context, &renderer->irradiance);
     es_planes_free(context, &renderer->specular);
@@ -125,6 +126,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_lamp_light_free(context, &renderer->lamps);
     es_trace_scene_free(&renderer->trace_scene);
     es_micro_free(context, &renderer->micro);
+    es_environment_map_free(context, &renderer->environment);
     es_arena_free(&renderer->arena);
     if (renderer->rasterizer) es_rasterizer_destroy(renderer->rasterizer);
     es_release(context, renderer, sizeof *renderer);
@@ -199,6 +201,7 @@ static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
     /* motion depends on last frame's pose as well: while anything moves, every step is new */
     uint64_t moving = in->revisions.moving ? in->revisions.steps : 0;
     es_plan_reads(&r->plan, &moving, sizeof moving);
+    es_plan_reads(&r->plan, &in->has_environment, sizeof in->has_environment); /* which moves as well, see es_background_job */
     if (!es_plan_run(&r->plan, ES_PASS_VISIBILITY)) return ES_OK;
     es_result result = r->settings.temporal ? es_history_keep(r->context, &r->gbuffer, &r->history.gbuffer) : ES_OK;
     if (!result) result = es_draw_gbuffer(r->rasterizer, in->list, &r->view, &r->gbuffer, &r->stats.raster);
@@ -439,6 +442,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     job.lit = specular->lit;
     es_lamps_compose(r, &job);
     for (int k = 0; k < 3; k++) {
+        if (r->plan.valid[ES_PASS_BACKGROUND]) job.background[k] = r->background.at[k];
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
         if (es_indirect_is_there(r)) job.irradiance[k] = irradiance->at[k];
         if (es_indirect_is_there(r) && r->has_specular) job.specular[k] = specular->at[k];
@@ -454,6 +458,7 @@ static void pass_compose(es_renderer* r)
     es_compose_job job = es_renderer_compose_job(r);
     es_plan_begin(plan, ES_PASS_COMPOSE);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
+    es_plan_reads_pass(plan, ES_PASS_BACKGROUND);
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
     es_plan_reads_pass(plan, ES_PASS_LAMP_LIGHT);
     es_plan_reads_pass(plan, ES_PASS_LAMP_FILTER);
@@ -479,6 +484,8 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     es_antialias_aim(r, picture);
     r->rays = es_pixel_rays_of_view(&r->view);
     es_result result = pass_visibility(r, in);
+    if (!result) result = es_pass_background(r, in);
+    if (!result) result = es_pass_environment(r, in);
     if (!result) result = pass_light_views(r, in);
     if (!result) result = pass_vpls(r, in, world, picture);
     if (!result) result = es_pass_lamps(r, in);
@@ -523,6 +530,7 @@ static es_result render(es_renderer* r, es_world* world)
     size_t light_count;
     in.lights = es_world_lights(world, &light_count);
     in.light_count = (uint32_t)light_count;
+    in.has_environment = es_world_get_environment(world, &in.environment);
     in.has_geometry = es_world_bounds(world, &in.bounds_min, &in.bounds_max);
     in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-9f) : 1.0f;
     const es_renderer_settings* s = &r->settings;

@@ -3,6 +3,7 @@
 #define EARTHSHINE_GI_RENDERER_H
 
 #include "gi/compose.h"
+#include "gi/environment.h"
 #include "gi/filter.h"
 #include "gi/half_resolution.h"
 #include "gi/history.h"
@@ -77,6 +78,9 @@ struct es_renderer {
     es_trace_scene trace_scene; /* of traced methods */
     es_micro_buffers micro;
 
+    es_planes background;      /* the environment where nothing is seen; kept while there is one */
+    es_environment_map environment; /* valid when the pass is */
+
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;
     es_planes specular, filtered_specular;        /* used when something in the frame has a lobe */
@@ -97,6 +101,8 @@ typedef struct es_frame_inputs {
     const es_light_state* lights;
     uint32_t light_count;
     es_world_revisions revisions;
+    es_environment_desc environment;
+    bool has_environment;
     es_vec3 bounds_min, bounds_max;
     float extent;            /* diagonal of the world's bounds, metres */
     bool has_geometry;
@@ -108,6 +114,9 @@ typedef struct es_frame_inputs {
 float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inputs* in);
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer);
 void es_planes_free(es_context* context, es_planes* planes);
+/* The environment as background, and its maps for light (gi/environment_passes.c). */
+es_result es_pass_background(es_renderer* renderer, const es_frame_inputs* in);
+es_result es_pass_environment(es_renderer* renderer, const es_frame_inputs* in);
 /* Passes of traced methods (gi/traced_passes.c). */
 es_result es_pass_hierarchy(es_renderer* renderer, const es_frame_inputs* in, es_world* world);
 es_result es_pass_compensation(es_renderer* renderer, const es_frame_inputs* in);

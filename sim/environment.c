@@ -67,7 +67,10 @@ es_result es_world_set_environment(es_world* world, const es_environment_desc* d
     differs |= memcmp(world->environment_radiance, d.radiance, sizeof d.radiance) != 0 || memcmp(&world->environment_rotation, &d.rotation, sizeof d.rotation) != 0;
     memcpy(world->environment_radiance, d.radiance, sizeof d.radiance);
     world->environment_rotation = d.rotation;
-    if (differs) world->revisions.lights++;
+    if (differs) {
+        world->revisions.lights++;
+        world->revisions.environment++;
+    }
     return ES_OK;
 }
 

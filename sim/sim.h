@@ -248,7 +248,7 @@ ES_API es_result es_world_get_light(const es_world* world, es_light light, es_li
 
 /* ---- environment: light from everywhere, infinitely far away --------------------------------------------------------------------------------- */
 
-/* A world has at most one. It lights the reference's paths and is what they see where nothing else is; the real-time methods leave it black. */
+/* A world has at most one. It lights the reference's paths; where nothing else is, it is what is seen by them and by the real-time methods. */
 typedef struct es_environment_desc {
     const es_image* image;    /* lat-long, linear radiance, three channels or more: the row's centre has the elevation, top +y; the middle
                                * column looks along -z, columns to the right turn towards +x. Copied. NULL: the same radiance everywhere */
@@ -740,7 +740,8 @@ ES_API const es_light_state* es_world_lights(const es_world* world, size_t* coun
 typedef struct es_world_revisions {
     uint64_t geometry;    /* transforms, meshes, instances */
     uint64_t materials;   /* materials and textures */
-    uint64_t lights;
+    uint64_t lights;      /* the environment among them */
+    uint64_t environment; /* by itself */
     uint64_t camera;      /* active camera: which, its pose, its lens */
     uint64_t steps;       /* up by one with each es_world_step, by two or more where what was last frame is not the frame before: es_world_restore */
     bool moving;          /* some previous transform, vertex or view differs from the present one */

@@ -87,7 +87,7 @@ es_result es_world_create(es_context* context, const es_world_settings* settings
     w->list.material_count = 1;
     /* counted from a number no other world of the context reaches, so that equal revisions mean the same world too */
     uint64_t first = es_context_next_serial(context) << 32;
-    w->revisions = (es_world_revisions){first, first, first, first, first, false};
+    w->revisions = (es_world_revisions){first, first, first, first, first, first, false};
     es_context_count_object(context, 1);
     *world = w;
     return ES_OK;

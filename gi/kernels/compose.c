@@ -73,6 +73,7 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y)
     es_unpack_rgb9e5_v(vi_load(g->emission + at), &c.r, &c.g, &c.b);
     vm unlit = vi_eq(vi_shift_right_logical(surface, 24), vi_set1(ES_SURFACE_UNLIT)) & vm_gt(vf_load(g->depth + at), vf_zero());
     c = sum(c, (rgb_v){vf_and(unlit, albedo.r), vf_and(unlit, albedo.g), vf_and(unlit, albedo.b)});
+    if (job->background[0]) c = sum(c, load_rgb(job->background, at));
     store_rgb(job->emitted, at, c);
     const bool lamps = job->lamp_irradiance[0] || job->lamp_specular[0];
     vf diffuse = vf_zero();
