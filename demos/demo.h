@@ -40,6 +40,8 @@ typedef struct demo_options {
     size_t set_count;
     const char* stats;
     const char *record, *replay; /* files */
+    const char* environment;     /* file; NULL */
+    double environment_rotation, environment_intensity;
     const char* recorded_settings; /* of the file that is replayed: key=value between blanks, in place of the scene's own; NULL */
     bool reference; /* the command is `reference`; the texts below are values of its settings, NULL when not given */
     const char *spp, *seconds, *error, *bounces;
@@ -96,6 +98,8 @@ typedef struct demo_session {
 } demo_session;
 
 int demo_session_open(const demo_options* options, demo_session* session);
+/* es_world_open, and what --environment says; the message is the context's. */
+es_result demo_open_world(es_context* context, const demo_options* options, const char* scene, const es_world_settings* settings, es_world** world);
 /* The context alone. */
 int demo_session_open_context(const demo_options* options, demo_session* session);
 void demo_session_close(demo_session* session);

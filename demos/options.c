@@ -84,9 +84,9 @@ static int parse_method(const char* text, demo_options* options)
     return demo_refuse("--gi %s: none, ism, classic, vpl-traced, vpl-sampled or micro is expected", text);
 }
 
-enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, RECORD, REPLAY, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
+enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, RECORD, REPLAY, ENVIRONMENT, ROTATION, INTENSITY, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
 static const char* const option_names[OPTION_COUNT] = {"--out", "--size", "--frames", "--fps", "--threads", "--isa", "--no-skip", "--gi", "--set",
-    "--image", "--hash", "--stats", "--record", "--replay", "--spp", "--seconds", "--error", "--bounces", "--resume"};
+    "--image", "--hash", "--stats", "--record", "--replay", "--environment", "--environment-rotation", "--environment-intensity", "--spp", "--seconds", "--error", "--bounces", "--resume"};
 
 static bool belongs_to(enum option_id id, bool reference)
 {
@@ -143,6 +143,15 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
     case REPLAY:
         options->replay = value;
         return DEMO_OK;
+    case ENVIRONMENT:
+        options->environment = value;
+        return DEMO_OK;
+    case ROTATION:
+        if (demo_parse_double(value, -1000, 1000, &options->environment_rotation)) return DEMO_OK;
+        return demo_refuse("--environment-rotation %s: radians from -1000 to 1000 are expected", value);
+    case INTENSITY:
+        if (demo_parse_double(value, 0, 1e6, &options->environment_intensity)) return DEMO_OK;
+        return demo_refuse("--environment-intensity %s: a factor from 0 to 1e6 is expected", value);
     case SPP:
         options->spp = value;
         return DEMO_OK;
@@ -166,7 +175,7 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
 
 int demo_parse_options(const char* command, int count, char** arguments, demo_options* options)
 {
-    *options = (demo_options){.end = 1, .fps = 30, .method = -1, .reference = !strcmp(command, "reference")};
+    *options = (demo_options){.end = 1, .fps = 30, .method = -1, .environment_intensity = 1, .reference = !strcmp(command, "reference")};
     bool only_names = false;
     for (int i = 0; i < count; i++) {
         const char* argument = arguments[i];

@@ -8,7 +8,7 @@ static int open_parts(player* p, demo_session* fresh, const char* scene, const e
 {
     fresh->context = p->session.context;
     fresh->settings = *renderer;
-    if (es_world_open(fresh->context, scene, world, &fresh->world) != ES_OK) return DEMO_BAD_INPUT;
+    if (demo_open_world(fresh->context, &p->options, scene, world, &fresh->world) != ES_OK) return DEMO_BAD_INPUT;
     return es_renderer_create(fresh->context, renderer, &fresh->renderer) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
 }
 

@@ -159,7 +159,7 @@ int demo_reference(int count, char** arguments)
         if (!settings.max_samples && !(settings.max_seconds > 0) && !(settings.max_error > 0)) settings.max_samples = 256;
         code = check_images(&options, settings.bounces);
     }
-    if (code == DEMO_OK && es_world_open(session.context, options.scene, &world_settings, &session.world) != ES_OK) code = demo_refuse_context(session.context);
+    if (code == DEMO_OK && demo_open_world(session.context, &options, options.scene, &world_settings, &session.world) != ES_OK) code = demo_refuse_context(session.context);
     if (code == DEMO_OK && es_reference_create(session.context, &settings, &reference) != ES_OK) code = demo_refuse_context(session.context);
     if (code == DEMO_OK) {
         struct sigaction action = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};

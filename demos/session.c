@@ -14,6 +14,19 @@ int demo_session_open_context(const demo_options* options, demo_session* session
     return result == ES_OK ? DEMO_OK : demo_refuse("%s", es_result_text(result));
 }
 
+es_result demo_open_world(es_context* context, const demo_options* options, const char* scene, const es_world_settings* settings, es_world** world)
+{
+    es_result result = es_world_open(context, scene, settings, world);
+    if (result != ES_OK || !options->environment) return result;
+    const float factor = (float)options->environment_intensity;
+    es_environment_desc desc = {.radiance = {factor, factor, factor}, .rotation = (float)options->environment_rotation};
+    result = es_world_load_environment(*world, options->environment, &desc);
+    if (result == ES_OK) return ES_OK;
+    es_world_destroy(*world);
+    *world = NULL;
+    return result;
+}
+
 int demo_session_open(const demo_options* given, demo_session* session)
 {
     demo_options options_in_use = *given, *options = &options_in_use;
@@ -22,7 +35,7 @@ int demo_session_open(const demo_options* given, demo_session* session)
     es_world_settings world_settings;
     if (options->replay) code = demo_replay_load(session, options);
     if (code == DEMO_OK) code = demo_apply_settings(session->context, options, &world_settings, &session->settings, NULL);
-    if (code == DEMO_OK && es_world_open(session->context, options->scene, &world_settings, &session->world) != ES_OK)
+    if (code == DEMO_OK && demo_open_world(session->context, options, options->scene, &world_settings, &session->world) != ES_OK)
         code = demo_refuse_context(session->context);
     if (code == DEMO_OK && es_renderer_create(session->context, &session->settings, &session->renderer) != ES_OK)
         code = demo_refuse_context(session->context);

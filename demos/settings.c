@@ -136,6 +136,7 @@ int demo_apply_settings(es_context* context, const demo_options* options, es_wor
     es_reference_settings* reference)
 {
     *world = es_default_world_settings();
+    if (options->environment) world->default_light = false; /* there is light */
     if (renderer) *renderer = es_default_renderer_settings();
     if (reference) *reference = es_default_reference_settings();
     const setting_targets to = {context, world, renderer, reference};

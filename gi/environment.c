@@ -5,6 +5,7 @@
 #include "gi/kernel_table.h"
 #include "gi/octahedral.h"
 #include "platform/maths.h"
+#include "sim/environment.h"
 
 enum { MOST_TAPS = 256, SOURCES = 64 /* of irradiance, along a side */, LARGEST = 512, SMALLEST = 128 };
 
@@ -95,7 +96,7 @@ static es_result make_base(es_context* context, const es_environment_desc* envir
     if (!with_image.image) with_image.image = &white;
     double* rows = es_allocate_array(context, height + 1, sizeof *rows);
     if (!rows) return es_context_last_result(context);
-    es_octahedral_rows(height, rows);
+    es_elevation_sines(height, rows);
     float* base = level_texels(map, &map->means, 0);
     es_octahedral_job job = {&with_image, rows, size, base};
     es_parallel_for(context, 4, 1, quarters, &job);

@@ -26,16 +26,6 @@ static double whole_below(double x)
     return whole > x ? whole - 1.0 : whole;
 }
 
-void es_octahedral_rows(uint32_t height, double* rows)
-{
-    for (uint32_t i = 0; i <= height; i++) {
-        /* 1 - 2 sin² (θ / 2) from the nearer pole: the cosine of a small angle would keep nothing of it */
-        const uint32_t from_pole = i <= height - i ? i : height - i;
-        const double sine = (double)es_sin(0.5f * ES_PI * (float)from_pole / (float)height), y = 1.0 - 2.0 * sine * sine;
-        rows[i] = 2 * i == height ? 0.0 : i <= height - i ? y : -y;
-    }
-}
-
 typedef struct meridian {
     const es_octahedral_job* job;
     double azimuth;             /* that it stands for, radians */

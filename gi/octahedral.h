@@ -6,7 +6,7 @@
 
 /* One of four directions of azimuth: the square's quarters are written apart. `size` texels along a side, a power of two of 4 or more; texels of
  * four floats with a border of one around them; of the quarter's own, the power of r, g and b and the solid angle are written. `rows`: the sine of the
- * elevation of the image's row borders, height + 1 of them from 1 to -1. */
+ * elevation of the image's row borders, see es_elevation_sines. */
 typedef struct es_octahedral_job {
     const es_environment_desc* environment;
     const double* rows;
@@ -14,7 +14,6 @@ typedef struct es_octahedral_job {
     float* texels;
 } es_octahedral_job;
 
-void es_octahedral_rows(uint32_t height, double* rows);
 void es_octahedral_quarter(const es_octahedral_job* job, uint32_t quarter);
 
 /* The direction of the middle of a texel, unit. */

@@ -255,10 +255,16 @@ typedef struct es_environment_desc {
     float radiance[3];        /* factor, W/(m² sr); all zero: no environment */
     float rotation;           /* radians about +y, counter-clockwise seen from above */
 } es_environment_desc;
-/* NULL: none. INVALID_ARGUMENT when a number is negative, beyond 1e12 or not finite, or the image has fewer than three channels. R, G and
- * B are found by their names, or else the first three are taken. Counts as a change of the lights. Radiance and rotation are part of the
- * saved state; the image is an asset. */
+/* Larger images are brought down to this, each texel the mean by solid angle over what it covers, so that no power is lost; it takes 12 bytes a texel, at most
+ * 100 MB, besides what the caller's image takes. */
+enum { ES_ENVIRONMENT_MAX_WIDTH = 4096, ES_ENVIRONMENT_MAX_HEIGHT = 2048 };
+/* NULL: none. INVALID_ARGUMENT when a number of `desc` is negative, beyond 1e12 or not finite, or the image has fewer than three channels. R, G and
+ * B are found by their names, or else the first three are taken. Values of texels that are negative, beyond 1e12 or not finite become 0, which a warning says once, with
+ * their number and the first one's place. Counts as a change of the lights. Radiance and rotation are part of the saved state; the image is an asset. */
 ES_API es_result es_world_set_environment(es_world* world, const es_environment_desc* desc);
+/* The same with the image of a file, EXR or HDR; desc's own is not read. NULL: as it is, not turned. What es_image_load returns, and FILE_UNSUPPORTED for what is no
+ * lat-long picture of three channels, such as a cube map. */
+ES_API es_result es_world_load_environment(es_world* world, const char* path, const es_environment_desc* desc);
 /* False when there is none. The image is the world's own copy and valid until the next call that changes the world. */
 ES_API bool es_world_get_environment(const es_world* world, es_environment_desc* desc);
 

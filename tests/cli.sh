@@ -132,6 +132,18 @@ head -c 2000 stack.rec >damaged.rec
 refused 'damaged' render --replay damaged.rec
 refused 'option of render and play' reference cornell --out truth.exr --record other.rec
 
+expect 0 render cornell --size 8x48 --gi none --out cube.hdr
+expect 0 render cornell --size 16x8 --gi none --image depth --out depth.exr
+expect 0 render stress "${small[@]}" --hash --image background --environment one.hdr
+cp out first
+expect 0 render stress "${small[@]}" --hash --image background --environment one.hdr --environment-rotation 2 --environment-intensity 3
+! cmp -s out first || fail 'the environment is neither turned nor brighter'
+expect 0 reference cornell --size 64x48 --spp 1 --hash --environment one.hdr
+refused 'missing.exr' render cornell --hash --environment missing.exr
+refused 'lat-long picture is expected' render cornell --hash --environment cube.hdr
+refused 'must have red, green and blue' render cornell --hash --environment depth.exr
+refused '--environment-rotation x' render cornell --hash --environment-rotation x
+refused '--environment-intensity -1' render cornell --hash --environment-intensity -1
 refused 'scene' render
 refused 'nothing would come of it' render cornell
 refused "nearest is 'cornell'" render cornel --hash

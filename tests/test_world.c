@@ -546,10 +546,9 @@ static void environment(void** state)
 
     lights = es_world_get_revisions(w).lights;
     uint64_t hash = es_world_hash(w);
-    struct { float radiance, rotation, pixel; } wrong[] = {{-1, 0, 0}, {NAN, 0, 0}, {INFINITY, 0, 0}, {1, NAN, 0}, {1, 1e9f, 0}, {1, 0, -1e-3f}, {1, 0, NAN}, {1, 0, INFINITY}};
+    struct { float radiance, rotation; } wrong[] = {{-1, 0}, {NAN, 0}, {INFINITY, 0}, {1, NAN}, {1, 1e9f}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         es_environment_desc bad = {.image = &image, .radiance = {1, 1, wrong[i].radiance}, .rotation = wrong[i].rotation};
-        image.pixels[9] = wrong[i].pixel;
         assert_int_equal(es_world_set_environment(w, &bad), ES_INVALID_ARGUMENT);
     }
     image.channels = 2;
@@ -577,6 +576,60 @@ static void environment(void** state)
     assert_false(es_world_get_environment(w, &got));
     free(saved);
     es_image_destroy(f->context, &image);
+}
+
+/* Values that are no light become 0, which is said once; a picture larger than the world keeps becomes smaller and loses no power. */
+static void count_warnings(void* user, es_log_level level, es_result item, const char* message)
+{
+    int* count = user;
+    if (level == ES_LOG_WARNING && strstr(message, "3 values") && strstr(message, "(2, 1)")) ++*count;
+}
+static void odd_environments(void** state)
+{
+    int warnings = 0;
+    es_context_desc desc = es_default_context_desc();
+    desc.threads = 1;
+    desc.logger = (es_logger){count_warnings, &warnings};
+    es_context* c;
+    assert_int_equal(es_context_create(&desc, &c), ES_OK);
+    es_world* w;
+    assert_int_equal(es_world_create(c, NULL, &w), ES_OK);
+    es_image image;
+    es_environment_desc got, environment = {.image = &image, .radiance = {1, 1, 1}};
+    assert_int_equal(es_image_create(c, 4, 3, 3, &image), ES_OK);
+    for (int i = 0; i < 36; i++) image.pixels[i] = 2;
+    image.pixels[3 * 6 + 1] = NAN;
+    image.pixels[3 * 7] = -1;
+    image.pixels[3 * 11 + 2] = INFINITY;
+    assert_int_equal(es_world_set_environment(w, &environment), ES_OK);
+    assert_int_equal(warnings, 1);
+    assert_true(es_world_get_environment(w, &got));
+    for (int i = 0; i < 36; i++) assert_true(got.image->pixels[i] == (i == 19 || i == 21 || i == 35 ? 0.0f : 2.0f));
+    es_image_destroy(c, &image);
+
+    /* twice as wide, not a whole number of times as high, and the other way round */
+    static const uint32_t sizes[][2] = {{2 * ES_ENVIRONMENT_MAX_WIDTH, 3}, {3, ES_ENVIRONMENT_MAX_HEIGHT + 513}, {ES_ENVIRONMENT_MAX_WIDTH + 37, 2}};
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++) {
+        const uint32_t width = sizes[s][0], height = sizes[s][1];
+        assert_int_equal(es_image_create(c, width, height, 3, &image), ES_OK);
+        for (size_t i = 0; i < (size_t)width * height * 3; i++) image.pixels[i] = 1e-3f;
+        image.pixels[3 * ((size_t)width * (height / 3) + width / 5) + 1] = 1e3f;
+        assert_int_equal(es_world_set_environment(w, &environment), ES_OK);
+        assert_true(es_world_get_environment(w, &got) && got.image->width <= ES_ENVIRONMENT_MAX_WIDTH && got.image->height <= ES_ENVIRONMENT_MAX_HEIGHT);
+        double power[2] = {0, 0};
+        const es_image* of[2] = {&image, got.image};
+        for (int which = 0; which < 2; which++)
+            for (uint32_t y = 0; y < of[which]->height; y++)
+                for (uint32_t x = 0; x < of[which]->width; x++) {
+                    const double h = of[which]->height, pi = 3.14159265358979323846;
+                    power[which] += (double)of[which]->pixels[3 * ((size_t)y * of[which]->width + x) + 1] * (cos(pi * y / h) - cos(pi * (y + 1) / h)) / of[which]->width;
+                }
+        if (!(fabs(power[1] / power[0] - 1) < 1e-5)) fail_msg("%u × %u: power %.8g became %.8g", width, height, power[0], power[1]);
+        es_image_destroy(c, &image);
+    }
+    es_world_destroy(w);
+    assert_int_equal(es_context_bytes(c), 0);
+    es_context_destroy(c);
 }
 
 /* ---- saved states ---------------------------------------------------------------------------------------------------------------------- */
@@ -791,7 +844,7 @@ int main(void)
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
     const struct CMUnitTest tests[] = {
         TEST(handles), TEST(references), TEST(refusals), TEST(meshes), TEST(deforming), TEST(tree), TEST(previous_pose), TEST(lights), TEST(clips),
-        TEST(settings), TEST(environment), TEST(saving), TEST(scenes), TEST(closed_meshes), TEST(cornell_stays_inside), TEST(determinism), TEST(little_memory),
+        TEST(settings), TEST(environment), TEST(odd_environments), TEST(saving), TEST(scenes), TEST(closed_meshes), TEST(cornell_stays_inside), TEST(determinism), TEST(little_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
