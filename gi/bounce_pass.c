@@ -5,6 +5,7 @@
 #include "gi/bounces.h"
 #include "gi/classic.h"
 #include "gi/indirect.h"
+#include "gi/lamp_passes.h"
 #include "gi/micro_passes.h"
 #include "gi/passes.h"
 
@@ -14,9 +15,11 @@ enum { POINT_SUBSETS = 128 };
 /* Those that virtual point lights make: all, or all but the last, which micro-buffers gather. */
 static uint32_t bounces_of(const es_renderer_settings* s) { return s->method == ES_GI_MICRO ? es_micro_vpl_bounces(s) : s->bounces; }
 
-uint32_t es_bounce_capacity(const es_renderer_settings* s) { return s->vpls + (bounces_of(s) > 1 ? (bounces_of(s) - 1) * s->bounce_vpls : 0); }
+static uint32_t further_vpls(const es_renderer_settings* s) { return bounces_of(s) > 1 ? (bounces_of(s) - 1) * s->bounce_vpls : 0; }
 
-uint32_t es_bounce_room(const es_renderer* r) { return r->first_vpls + es_bounce_capacity(&r->settings) - r->settings.vpls; }
+uint32_t es_bounce_capacity(const es_renderer_settings* s) { return s->vpls + (s->lamps != ES_LAMPS_NONE ? s->lamp_vpls : 0) + further_vpls(s); }
+
+uint32_t es_bounce_room(const es_renderer* r) { return r->first_vpls + further_vpls(&r->settings); }
 
 bool es_bounce_wants_points(const es_renderer_settings* s) { return bounces_of(s) > 1 && s->bounce_vpls && s->bounce_method == ES_BOUNCE_REFLECTIVE; }
 
@@ -32,11 +35,11 @@ uint32_t es_bounce_end(const es_renderer* r, uint32_t bounces)
     return end;
 }
 
-static es_result prepare_points(es_renderer* r, const es_frame_inputs* in, const es_scene_points** points)
+static es_result prepare_points(es_renderer* r, const es_frame_inputs* in, uint32_t method, const es_scene_points** points)
 {
     const es_renderer_settings* s = &r->settings;
     *points = &r->points;
-    if (s->bounce_method == ES_BOUNCE_ONE_PASS) {
+    if (method == ES_BOUNCE_ONE_PASS) {
         uint64_t moved;
         *points = &r->bounce_points;
         es_result result = es_scene_points_update(r->context, &r->bounce_points, in->list, &(es_point_request){.subset_size = s->bounce_points, .subset_count = POINT_SUBSETS}, &moved);
@@ -51,14 +54,67 @@ static es_result draw_maps(es_renderer* r, const es_frame_inputs* in, uint32_t f
     return r->settings.method == ES_GI_CLASSIC ? es_draw_classic_maps(r, in, first, end) : ES_OK;
 }
 
+/* ---- of lamps ------------------------------------------------------------------------------------------------------------------ */
+
+static bool is_traced(const es_renderer_settings* s) { return s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED; }
+
+bool es_lamps_bounce(const es_renderer* r, const es_frame_inputs* in) { return !in->no_vpls && es_lamps_are_there(r) && r->settings.lamp_vpls && bounces_of(&r->settings); }
+
+/* Of one bounce, maps alone say what lamps see, unless there are none. */
+bool es_lamps_bounce_wants_rays(const es_renderer* r, const es_frame_inputs* in)
+{
+    return es_lamps_bounce(r, in) && (!es_lamps_want_maps(r) || is_traced(&r->settings) || (bounces_of(&r->settings) > 1 && r->settings.bounce_rays));
+}
+
+es_result es_pass_lamp_bounce(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    if (!es_lamps_bounce(r, in)) {
+        es_plan_not_needed(plan, ES_PASS_LAMP_BOUNCE, in->no_vpls ? in->no_vpls : !es_lamps_are_there(r) ? plan->stats[ES_PASS_LAMPS].skipped ? plan->stats[ES_PASS_LAMPS].skipped : "no light comes from what glows" : "lamps.vpls is 0");
+        return ES_OK;
+    }
+    es_result result = es_reserve_vpls(r, es_bounce_capacity(s));
+    if (result) return result;
+    const bool rays = es_lamps_bounce_wants_rays(r, in), maps = es_lamps_want_maps(r) && !is_traced(s);
+    es_plan_begin(plan, ES_PASS_LAMP_BOUNCE);
+    const es_pass read[] = {ES_PASS_VPLS, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
+    for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
+    es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
+    const uint32_t words[] = {s->lamp_vpls, s->bounce_points, s->bounce_rays, s->seed, s->interleave, rays, maps, r->punctual_vpls};
+    es_plan_reads(plan, words, sizeof words);
+    const float numbers[] = {s->lamp_slope_bias, in->extent};
+    es_plan_reads(plan, numbers, sizeof numbers);
+    r->first_vpls = r->punctual_vpls + s->lamp_vpls;
+    if (!es_plan_run(plan, ES_PASS_LAMP_BOUNCE)) return ES_OK;
+    const es_lamps* set = &r->lamps.set;
+    es_bounce_job job = {.method = ES_BOUNCE_ONE_PASS, .vpls = r->vpls, .senders = set->records, .sender_count = set->count, .first = r->punctual_vpls, .count = s->lamp_vpls, .bounce = 1, .seed = s->seed,
+        .subsets = s->interleave * s->interleave, .surfels = &r->surfels, .maps = maps ? &r->lamps.maps : NULL, .extent = in->extent, .near_distance = es_near_distance(in), .slope_bias = s->lamp_slope_bias * in->extent,
+        .rays = s->bounce_rays, .glossy = s->glossy_vpls};
+    result = prepare_points(r, in, ES_BOUNCE_ONE_PASS, &job.points);
+    es_vpl_visibility visibility;
+    if (!result && rays) {
+        es_arena_reset(&r->arena);
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, set->records, set->count, in->extent, &visibility);
+        job.scene = &r->trace_scene;
+        job.ends = visibility.ends;
+    }
+    if (!result) result = es_bounce_lights(r->context, &job);
+    if (!result) es_plan_done(plan, ES_PASS_LAMP_BOUNCE, s->lamp_vpls);
+    return result;
+}
+
+/* ---- further ones -------------------------------------------------------------------------------------------------------------- */
+
 static es_result add_bounce(es_renderer* r, const es_frame_inputs* in, const es_scene_points* points, uint32_t bounce)
 {
     const es_renderer_settings* s = &r->settings;
-    const bool traced = s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED;
+    const bool traced = is_traced(s);
     const es_bounce_stats* before = &r->bounces[bounce - 2];
     es_bounce_stats* stats = &r->bounces[bounce - 1];
     double start = es_seconds();
-    es_bounce_job job = {.method = s->bounce_method, .vpls = r->vpls, .first_sender = r->vpl_count - before->vpls, .sender_count = before->vpls, .first = r->vpl_count, .count = s->bounce_vpls, .bounce = bounce,
+    es_bounce_job job = {.method = s->bounce_method, .vpls = r->vpls, .senders = r->vpls, .first_sender = r->vpl_count - before->vpls, .sender_count = before->vpls, .first = r->vpl_count, .count = s->bounce_vpls, .bounce = bounce,
         .seed = s->seed, .subsets = s->interleave * s->interleave, .points = points, .surfels = &r->surfels, .maps = traced ? NULL : &r->maps, .extent = in->extent, .near_distance = es_near_distance(in),
         .bias = s->ism_bias * in->extent, .slope_bias = s->ism_slope_bias * in->extent, .rays = s->bounce_rays, .lobe_roughness = s->traced_bias == ES_TRACED_UNBOUNDED ? 0.0f : s->lobe_roughness, .glossy = s->glossy_vpls,
         .size = s->ism_size, .levels = s->pull_push ? s->pull_push_levels : 0, .push_threshold = s->push_threshold};
@@ -108,7 +164,7 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
         return ES_OK;
     }
     es_plan_begin(plan, ES_PASS_BOUNCES);
-    const es_pass read[] = {ES_PASS_VPLS, ES_PASS_POINTS, ES_PASS_ISM, ES_PASS_CLASSIC, ES_PASS_HIERARCHY};
+    const es_pass read[] = {ES_PASS_VPLS, ES_PASS_LAMP_BOUNCE, ES_PASS_POINTS, ES_PASS_ISM, ES_PASS_CLASSIC, ES_PASS_HIERARCHY};
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
@@ -119,7 +175,7 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
     if (es_plan_run(plan, ES_PASS_BOUNCES)) {
         const es_scene_points* points;
         r->vpl_count = r->first_vpls;
-        es_result result = prepare_points(r, in, &points);
+        es_result result = prepare_points(r, in, s->bounce_method, &points);
         for (uint32_t b = 2; b <= bounces && !result; b++) result = add_bounce(r, in, points, b);
         if (result) return result;
         es_plan_done(plan, ES_PASS_BOUNCES, r->vpl_count - r->first_vpls);

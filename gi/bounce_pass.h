@@ -12,6 +12,11 @@ uint32_t es_bounce_room(const es_renderer* renderer);
 bool es_bounce_wants_rays(const es_renderer_settings* settings);
 /* Are the scene's points wanted that reflective maps are drawn from? */
 bool es_bounce_wants_points(const es_renderer_settings* settings);
+/* Will lamps' light be reflected by lights of a first bounce? Once they are placed. And are rays wanted for that? */
+bool es_lamps_bounce(const es_renderer* renderer, const es_frame_inputs* in);
+bool es_lamps_bounce_wants_rays(const es_renderer* renderer, const es_frame_inputs* in);
+/* After lamps' shadow maps and the hierarchy: adds lights to es_renderer.first_vpls. */
+es_result es_pass_lamp_bounce(es_renderer* renderer, const es_frame_inputs* in);
 /* After the first bounce's lights, their maps and the hierarchy. Sets es_renderer.vpl_count and what the frame's statistics say of bounces. */
 es_result es_pass_bounces(es_renderer* renderer, const es_frame_inputs* in);
 /* Of the virtual point lights in the set, how many send the first `bounces` bounces. */

@@ -1,5 +1,6 @@
 #include "gi/bounces.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "gi/kernel_table.h"
@@ -31,8 +32,8 @@ static bool draws_rays(const es_bounce_job* job) { return job->method == ES_BOUN
 
 static es_bounce_sender sender_of(const es_bounce_job* job, uint32_t sender)
 {
-    const es_vpl_record* vpl = &job->vpls[sender];
-    es_bounce_sender s = {.model = vpl->model, .glossy = job->glossy && vpl->glossy, .far_distance = job->extent, .bias = job->bias, .slope_bias = job->slope_bias, .near_distance = job->near_distance, .backs = job->scene != NULL};
+    const es_vpl_record* vpl = &job->senders[sender];
+    es_bounce_sender s = {.model = vpl->model, .glossy = job->glossy && vpl->glossy, .parallel = vpl->parallel, .far_distance = job->extent, .bias = job->bias, .slope_bias = job->slope_bias, .near_distance = job->near_distance, .backs = job->scene != NULL};
     memcpy(s.position, vpl->position, sizeof s.position);
     memcpy(s.normal, vpl->normal, sizeof s.normal);
     memcpy(s.tangent, vpl->tangent, sizeof s.tangent);
@@ -72,10 +73,12 @@ static es_vec3 point_of(const es_surfel_set* set, uint32_t i) { return es_v3(set
 /* From the sender to the point, off both. */
 static es_ray ray_to(const es_bounce_job* job, uint32_t sender, const es_surfel_set* set, uint32_t i)
 {
-    const es_vec3 from = vector_of(job->vpls[sender].position), end = job->ends[sender - job->first_sender];
+    const es_vpl_record* vpl = &job->senders[sender];
+    const es_vec3 from = vector_of(vpl->position), end = job->ends[sender - job->first_sender], sent = vector_of(vpl->normal);
     es_vec3 p = point_of(set, i), n = es_unpack_normal(set->normal[i]);
-    if (es_v3_dot(n, es_v3_sub(from, p)) < 0.0f) n = es_v3_scale(n, -1.0f);
+    if ((vpl->parallel ? -es_v3_dot(n, sent) : es_v3_dot(n, es_v3_sub(from, p))) < 0.0f) n = es_v3_scale(n, -1.0f);
     p = es_offset_origin(es_v3_add(p, es_v3_scale(n, job->extent * ES_RAY_OFFSET_SHARE)), n);
+    if (vpl->parallel) return (es_ray){{p.x, p.y, p.z}, 0.0f, {-sent.x, -sent.y, -sent.z}, INFINITY};
     return (es_ray){{end.x, end.y, end.z}, 0.0f, {p.x - end.x, p.y - end.y, p.z - end.z}, 1.0f};
 }
 
@@ -199,12 +202,12 @@ static place place_at(const bounce_loop* loop, uint32_t sender, const es_bounce_
     es_vec3 from = vector_of(s->position), to = es_v3_sub(point_of(&set, i), from);
     float distance = es_maxf(es_v3_length(to), s->near_distance);
     place p = {.position = point_of(&set, i), .normal = es_unpack_normal(set.normal[i]), .surface = es_surface_of_gbuffer(set.albedo_rg[i], set.albedo_b[i], set.surface[i])};
-    p.incident = es_v3_scale(es_v3_normalize(to, vector_of(s->normal)), -1.0f);
+    p.incident = es_v3_scale(s->parallel ? vector_of(s->normal) : es_v3_normalize(to, vector_of(s->normal)), -1.0f);
     if (es_v3_dot(p.normal, p.incident) < 0.0f) p.normal = es_v3_scale(p.normal, -1.0f);
     float cosine = es_v3_dot(p.normal, p.incident);
     if (!reflective) {
         p.area = set.area[i];
-        p.received = es_v3_scale(intensity(s, es_v3_scale(to, 1.0f / distance)), cosine * p.area / (distance * distance));
+        p.received = s->parallel ? es_v3_scale(vector_of(s->color), cosine * p.area) : es_v3_scale(intensity(s, es_v3_scale(to, 1.0f / distance)), cosine * p.area / (distance * distance));
         return p;
     }
     float step = 2.0f / (float)job->size, u = ((float)(chosen % job->size) + 0.5f) * step - 1.0f, v = ((float)(chosen / job->size) + 0.5f) * step - 1.0f;

@@ -10,6 +10,7 @@
  *
  * ONE_PASS (Knecht §3.6): the places are points of the scene, each of which stands for an area a. A sender of intensity I(d), W/sr, gives one of them
  *     I(d) · cos / r² · a · V,      V by the sender's shadow map, as for a pixel, or by a ray.
+ * A parallel sender of irradiance E (es_vpl_record.parallel) gives it E · cos · a · V. It is one of ONE_PASS alone.
  * Every sender has its own set of points, stratified over the scene. Maps of few texels let light through walls, and each bounce would pass
  * on what the one before lost that way. So maps only say where to look: a place they hide keeps a small share of its weight, some places are drawn by
  * these weights, q_i, rays find which of them are seen, and one of those is taken. It has
@@ -33,7 +34,8 @@ enum { ES_BOUNCE_MAX_RAYS = 64 };
 
 typedef struct es_bounce_job {
     uint32_t method;                    /* es_bounce_method */
-    es_vpl_record* vpls;                /* senders [first_sender, first_sender + sender_count), lights from `first` on */
+    es_vpl_record* vpls;                /* lights from `first` on */
+    const es_vpl_record* senders;       /* [first_sender, first_sender + sender_count); the same array, or another */
     uint32_t first_sender, sender_count;
     uint32_t first, count;              /* lights to make */
     uint32_t bounce, seed, subsets;     /* subsets: of the interleaved pattern, each of which shall be a good sample set */
@@ -62,7 +64,7 @@ typedef struct es_bounce_sender {
     float color[3];                     /* flux / pi, W/sr */
     float power[3], incident[3], specular_color[3], roughness; /* used when glossy */
     uint32_t model;
-    bool glossy;
+    bool glossy, parallel;
     const uint16_t* map;                /* NULL: everything is seen */
     float doubt;                        /* share of its weight that a place has which the map hides */
     uint32_t map_size;

@@ -174,6 +174,7 @@ typedef struct es_renderer_settings {
     uint32_t lamp_count;             /* lights that stand for all of them */
     uint32_t lamp_size;              /* texels of a side of their imperfect maps: 32, 64, 128, 256; points and filling are those of the others */
     uint32_t lamp_interleave;        /* n of the n × n pattern, 1 … 16, and of its filter, which is applied filter_passes times */
+    uint32_t lamp_vpls;              /* virtual point lights that the first bounce of their light makes; with every method that has such lights */
     float lamp_roughness;            /* lobes sharper than this GGX roughness are widened to it under lamps */
     float lamp_slope_bias;           /* of their maps, as ism_slope_bias */
 } es_renderer_settings;

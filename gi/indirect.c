@@ -112,6 +112,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_BOUNCE);
     es_plan_reads_pass(plan, ES_PASS_ISM);
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
     es_plan_reads_pass(plan, ES_PASS_HIERARCHY);

@@ -152,7 +152,7 @@ static void draw_map(const ism_loop* loop, uint32_t v, uint16_t* work, gathered_
         return;
     }
     const es_vpl_record* vpl = &job->vpls[v];
-    es_parabolic_map parabolic = {.far_distance = job->far_distance, .near_distance = job->near_distance, .size = job->size};
+    es_parabolic_map parabolic = {.far_distance = job->far_distance, .near_distance = job->near_distance, .size = job->size, .parallel = vpl->parallel};
     memcpy(parabolic.position, vpl->position, sizeof parabolic.position);
     memcpy(parabolic.normal, vpl->normal, sizeof parabolic.normal);
     memcpy(parabolic.tangent, vpl->tangent, sizeof parabolic.tangent);
@@ -165,8 +165,9 @@ static void draw_map(const ism_loop* loop, uint32_t v, uint16_t* work, gathered_
         memcpy(pose + 6, vpl->tangent, 3 * sizeof(float));
         memcpy(pose + 9, vpl->bitangent, 3 * sizeof(float));
         kept->splats = 0;
-        if (memcmp(kept->pose, pose, sizeof pose) != 0) {
+        if (memcmp(kept->pose, pose, sizeof pose) != 0 || kept->parallel != vpl->parallel) {
             memcpy(kept->pose, pose, sizeof pose);
+            kept->parallel = vpl->parallel;
             kept->drawn = 0;
             kept->layered = false;
         }

@@ -11,6 +11,7 @@
  * order, so the bits are those of a map drawn from nothing. Where nothing moved at all the map itself stands. */
 typedef struct es_kept_map {
     float pose[12];            /* of the light: position, normal, tangent, bitangent */
+    bool parallel;
     uint64_t drawn;            /* es_scene_points.time when the map was; 0: it does not stand */
     bool layered;              /* its layer stands */
     uint32_t splats;           /* points drawn by the last build */

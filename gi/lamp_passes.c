@@ -10,7 +10,7 @@
 
 static const char* no_lamps(const es_renderer* r, const es_frame_inputs* in)
 {
-    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : !es_something_glows(in->list) ? "nothing glows" : NULL;
+    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : es_something_glows(in->list) || r->plan.valid[ES_PASS_ENVIRONMENT] ? NULL : "nothing glows";
 }
 
 es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
@@ -23,8 +23,12 @@ es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
         es_lamps_free(r->context, &r->lamps.set);
         return ES_OK;
     }
-    const es_lamp_request request = {.list = in->list, .materials = in->revisions.materials, .count = s->lamp_count, .subsets = s->lamp_interleave * s->lamp_interleave, .seed = s->seed, .extent = in->extent};
+    const es_environment_map* environment = r->plan.valid[ES_PASS_ENVIRONMENT] ? &r->environment : NULL;
+    const es_lamp_request request = {.list = in->list, .materials = in->revisions.materials, .count = s->lamp_count, .subsets = s->lamp_interleave * s->lamp_interleave, .seed = s->seed,
+        .environment = environment, .centre = es_v3_scale(es_v3_add(in->bounds_min, in->bounds_max), 0.5f), .extent = in->extent};
     es_plan_begin(plan, ES_PASS_LAMPS);
+    es_plan_reads_pass(plan, ES_PASS_ENVIRONMENT);
+    es_plan_reads(plan, &request.centre, sizeof request.centre);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
     const uint32_t words[] = {request.count, request.subsets, request.seed};
@@ -40,7 +44,7 @@ es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
 static const char* no_light(const es_renderer* r, const es_frame_inputs* in)
 {
     const char* why = no_lamps(r, in);
-    return why ? why : !r->lamps.set.count ? "what glows is black" : NULL;
+    return why ? why : !r->lamps.set.count ? "no light comes from what glows" : NULL;
 }
 
 bool es_lamps_are_there(const es_renderer* r) { return r->plan.valid[ES_PASS_LAMPS] && r->lamps.set.count; }
@@ -94,6 +98,9 @@ static es_result shade(es_renderer* r, const es_frame_inputs* in)
     job.rays = r->rays;
     job.interleave = s->lamp_interleave;
     job.seed = s->seed;
+    job.vpls = lamps->set.shaded;
+    job.vpl_count = lamps->set.shaded_count;
+    job.map_of = lamps->set.map_of;
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = lamps->irradiance.at[k];
         job.specular[k] = lamps->has_specular ? lamps->specular.at[k] : NULL;
@@ -102,7 +109,7 @@ static es_result shade(es_renderer* r, const es_frame_inputs* in)
     es_arena_reset(&r->arena);
     es_vpl_visibility visibility;
     if (es_lamps_want_rays(r)) {
-        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, lamps->set.records, lamps->set.count, in->extent, &visibility);
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, job.vpls, job.vpl_count, in->extent, &visibility);
         job.visibility = &visibility.shade;
         job.maps = NULL;
     }
@@ -168,7 +175,7 @@ es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
     if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {
         es_result result = shade(r, in);
         if (result) return result;
-        es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->lamps.set.count / (s->lamp_interleave * s->lamp_interleave));
+        es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->lamps.set.shaded_count / (s->lamp_interleave * s->lamp_interleave));
     }
     return pass_filter(r, NULL);
 }

@@ -201,40 +201,59 @@ static es_lamp_place place_in(const lamp_cell* cell, double share, float v, doub
 
 static double weight_of(const lamp_cell* cell) { return luminance(cell->radiance) * cell->area * (cell->both_sides ? 2.0 : 1.0); }
 
+static double sky_power_of(const es_lamp_request* request)
+{
+    if (!request->environment || !request->environment->memory) return 0.0;
+    const double* p = request->environment->power;
+    const double radius = 0.5 * (double)request->extent, power = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
+    return power * radius * radius * (double)ES_PI;
+}
+
+/* Lights of the surfaces among request->count. */
+static uint32_t share_of(double power, const es_lamp_request* request)
+{
+    enum { PARTS = 8 };
+    const double sky = sky_power_of(request);
+    if (!(power > 0.0)) return 0;
+    if (!(sky > 0.0)) return request->count;
+    const double parts = power / (power + sky) * PARTS;
+    const uint32_t whole = parts < 1.0 ? 1 : parts > PARTS - 1 ? PARTS - 1 : (uint32_t)(parts + 0.5);
+    return request->count * whole / PARTS;
+}
+
 static es_result place_lights(es_context* context, es_lamps* lamps, const es_lamp_request* request)
 {
     es_arena arena;
     es_arena_init(&arena, context, 1 << 16);
     cell_list list;
     es_result result = list_cells(context, &arena, request, &list);
-    lamps->count = 0;
+    lamps->glowing = 0;
     lamps->power = 0.0;
     double* sums = result ? NULL : es_arena_allocate(&arena, ((size_t)list.count + 1) * sizeof *sums); /* before each cell */
-    uint32_t* order = sums ? order_of(&arena, request, request->count) : NULL;
-    if (!result && !order) result = es_context_last_result(context);
+    if (!result && !sums) result = es_context_last_result(context);
     double sum = 0.0;
-    for (uint32_t i = 0; i < list.count && order; i++) {
+    for (uint32_t i = 0; i < list.count && !result; i++) {
         sums[i] = sum;
         sum += weight_of(&list.cells[i]);
     }
-    if (!result && sum > 0.0 && sum < 1e30) {
-        sums[list.count] = sum;
-        if (!es_grow(context, (void**)&lamps->places, &lamps->place_capacity, 0, request->count, sizeof *lamps->places)) result = es_context_last_result(context);
-        const double step = sum / request->count;
-        for (uint32_t v = 0; v < request->count && !result; v++) {
-            const uint32_t k = order[es_place_in_sequence(v, request->count, request->subsets)];
-            const double at = ((double)k + 0.5) * step;
-            uint32_t low = 0, high = list.count;
-            while (high - low > 1) {
-                const uint32_t middle = low + (high - low) / 2;
-                if (sums[middle] <= at) low = middle;
-                else high = middle;
-            }
-            lamps->places[v] = place_in(&list.cells[low], (at - sums[low]) / weight_of(&list.cells[low]), (float)((k * 2654435769u) >> 8) * (1.0f / 16777216.0f), step);
+    if (!result && sum > 0.0 && sum < 1e30) lamps->power = sum * (double)ES_PI;
+    const uint32_t count = share_of(lamps->power, request);
+    uint32_t* order = result || !count ? NULL : order_of(&arena, request, count);
+    if (!result && count && !order) result = es_context_last_result(context);
+    if (!result && count && !es_grow(context, (void**)&lamps->places, &lamps->place_capacity, 0, count, sizeof *lamps->places)) result = es_context_last_result(context);
+    const double step = count ? sum / count : 0.0;
+    for (uint32_t v = 0; v < count && !result; v++) {
+        const uint32_t k = order[es_place_in_sequence(v, count, request->subsets)];
+        const double at = ((double)k + 0.5) * step;
+        uint32_t low = 0, high = list.count;
+        while (high - low > 1) {
+            const uint32_t middle = low + (high - low) / 2;
+            if (sums[middle] <= at) low = middle;
+            else high = middle;
         }
-        lamps->count = result ? 0 : request->count;
-        lamps->power = sum * (double)ES_PI;
+        lamps->places[v] = place_in(&list.cells[low], (at - sums[low]) / weight_of(&list.cells[low]), (float)((k * 2654435769u) >> 8) * (1.0f / 16777216.0f), step);
     }
+    if (!result) lamps->glowing = count;
     es_arena_free(&arena);
     return result;
 }
@@ -270,6 +289,67 @@ static es_vpl_record record_of(const es_lamp_place* place, const es_lamp_request
     };
 }
 
+/* Into how many a light is split that the pattern is to spread over its subsets; all lights together into no more than twice their number. */
+static uint32_t parts_of(const es_environment_light* light, double mean, const es_lamp_request* request)
+{
+    const double parts = luminance(light->irradiance) / mean;
+    return request->subsets == 1 || !(parts > 1.0001) ? 1 : (uint32_t)parts + 1;
+}
+
+static es_vpl_record record_of_sky(const es_environment_light* light, const es_lamp_request* request)
+{
+    const es_vec3 normal = es_v3_scale(light->direction, -1.0f), position = es_v3_add(request->centre, es_v3_scale(light->direction, 0.5f * request->extent));
+    es_vec3 tangent, bitangent;
+    es_orthonormal_basis(normal, &tangent, &bitangent);
+    return (es_vpl_record){
+        .position = {position.x, position.y, position.z},
+        .normal = {normal.x, normal.y, normal.z},
+        .tangent = {tangent.x, tangent.y, tangent.z},
+        .bitangent = {bitangent.x, bitangent.y, bitangent.z},
+        .flux = {ES_PI * light->irradiance[0], ES_PI * light->irradiance[1], ES_PI * light->irradiance[2]},
+        .incident = {normal.x, normal.y, normal.z},
+        .roughness = 1.0f,
+        .model = ES_SURFACE_METALLIC_ROUGHNESS,
+        .parallel = true,
+    };
+}
+
+/* As records, for maps, in the order of the curve; and for the pattern, in parts of no more than the mean, in an order like that of the surfaces' lights. */
+static es_result add_sky(es_context* context, es_lamps* lamps, const es_lamp_request* request)
+{
+    const uint32_t first = lamps->glowing, wanted = sky_power_of(request) > 0.0 ? request->count - first : 0;
+    es_arena arena;
+    es_arena_init(&arena, context, 1 << 16);
+    es_environment_light* lights = es_arena_allocate(&arena, ((size_t)wanted + 1) * sizeof *lights);
+    const uint32_t count = lights && wanted ? es_environment_sample(request->environment, wanted, request->seed, lights) : 0;
+    uint32_t* parts = lights ? es_arena_allocate(&arena, ((size_t)2 * count + 1) * sizeof *parts) : NULL; /* lights of parts */
+    double mean = 0.0;
+    for (uint32_t v = 0; v < count; v++) mean += luminance(lights[v].irradiance) / count;
+    uint32_t part_count = 0;
+    for (uint32_t v = 0; v < count && parts; v++) {
+        lamps->records[first + v] = record_of_sky(&lights[v], request);
+        for (uint32_t k = parts_of(&lights[v], mean, request); k && part_count < 2 * count; k--) parts[part_count++] = v;
+    }
+    const uint32_t* order = part_count ? order_of(&arena, request, part_count) : NULL;
+    es_result result = !parts || (part_count && !order) ? es_context_last_result(context) : ES_OK;
+    const size_t shaded = (size_t)first + part_count;
+    if (!result && !es_grow(context, (void**)&lamps->shaded, &lamps->shaded_capacity, 0, shaded, sizeof *lamps->shaded)) result = es_context_last_result(context);
+    if (!result && !es_grow(context, (void**)&lamps->map_of, &lamps->map_capacity, 0, shaded, sizeof *lamps->map_of)) result = es_context_last_result(context);
+    lamps->count = first + (result ? 0 : count);
+    lamps->shaded_count = result ? 0 : (uint32_t)shaded;
+    for (uint32_t v = 0; v < lamps->shaded_count; v++) {
+        const uint32_t light = v < first ? 0 : parts[order[es_place_in_sequence(v - first, part_count, request->subsets)]];
+        lamps->map_of[v] = v < first ? v : first + light;
+        lamps->shaded[v] = lamps->records[lamps->map_of[v]];
+        const float share = v < first ? 1.0f : 1.0f / (float)parts_of(&lights[light], mean, request);
+        for (int k = 0; k < 3; k++) lamps->shaded[v].flux[k] *= share;
+    }
+    es_arena_free(&arena);
+    return result;
+}
+
+/* ---- both ----------------------------------------------------------------------------------------------------------------------------- */
+
 static uint64_t key_of(const es_lamp_request* request)
 {
     const uint64_t words[] = {request->count, request->subsets, request->seed, request->materials, request->list->instance_count};
@@ -289,20 +369,23 @@ static uint64_t key_of(const es_lamp_request* request)
 es_result es_lamps_update(es_context* context, es_lamps* lamps, const es_lamp_request* request)
 {
     const uint64_t key = key_of(request);
-    if (key != lamps->key) {
+    if (key != lamps->key || share_of(lamps->power, request) != lamps->glowing) {
         lamps->key = 0;
         es_result result = place_lights(context, lamps, request);
         if (result) return result;
         lamps->key = key;
     }
-    if (!es_grow(context, (void**)&lamps->records, &lamps->record_capacity, 0, lamps->count, sizeof *lamps->records)) return es_context_last_result(context);
-    for (uint32_t v = 0; v < lamps->count; v++) lamps->records[v] = record_of(&lamps->places[v], request);
-    return ES_OK;
+    lamps->count = lamps->glowing;
+    if (!es_grow(context, (void**)&lamps->records, &lamps->record_capacity, 0, request->count, sizeof *lamps->records)) return es_context_last_result(context);
+    for (uint32_t v = 0; v < lamps->glowing; v++) lamps->records[v] = record_of(&lamps->places[v], request);
+    return add_sky(context, lamps, request);
 }
 
 void es_lamps_free(es_context* context, es_lamps* lamps)
 {
     es_release(context, lamps->records, lamps->record_capacity * sizeof *lamps->records);
     es_release(context, lamps->places, lamps->place_capacity * sizeof *lamps->places);
+    es_release(context, lamps->shaded, lamps->shaded_capacity * sizeof *lamps->shaded);
+    es_release(context, lamps->map_of, lamps->map_capacity * sizeof *lamps->map_of);
     *lamps = (es_lamps){0};
 }

@@ -20,8 +20,8 @@ const char* es_micro_nothing(const es_frame_inputs* in, const es_renderer_settin
 {
     if (s->bounces == 0) return "bounces is 0";
     if (!in->has_geometry) return "nothing to light";
-    if (in->light_count) return NULL;
-    return !s->micro_emission && s->lamps == ES_LAMPS_NONE ? "no light is on" : es_something_glows(in->list) ? NULL : "no light is on and nothing glows";
+    if (in->light_count || in->may_have_lamps) return NULL;
+    return !s->micro_emission ? "no light is on" : es_something_glows(in->list) ? NULL : "no light is on and nothing glows";
 }
 
 bool es_micro_wants_photons(const es_renderer_settings* s) { return s->method == ES_GI_MICRO && s->micro_light == ES_MICRO_LIGHT_PHOTONS && s->bounces > 1; }

@@ -178,12 +178,12 @@ static es_result reserve_lights(es_renderer* renderer, uint32_t count)
     return ES_OK;
 }
 
-static es_result reserve_vpls(es_renderer* renderer, uint32_t count)
+es_result es_reserve_vpls(es_renderer* renderer, uint32_t count)
 {
     if (count <= renderer->vpl_capacity) return ES_OK;
     es_context* context = renderer->context;
     es_release(context, renderer->vpls, renderer->vpl_capacity * sizeof *renderer->vpls);
-    renderer->vpl_capacity = renderer->vpl_count = renderer->first_vpls = 0;
+    renderer->vpl_capacity = renderer->vpl_count = renderer->first_vpls = renderer->punctual_vpls = 0;
     renderer->vpls = es_allocate_array(context, count, sizeof *renderer->vpls);
     if (!renderer->vpls) return es_context_last_result(context);
     renderer->vpl_capacity = count;
@@ -277,11 +277,12 @@ static uint64_t scene_hash(const es_frame_inputs* in)
 static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_world* world, uint32_t picture)
 {
     es_plan* plan = &r->plan;
-    if (in->no_vpls) {
-        es_plan_not_needed(plan, ES_PASS_VPLS, in->no_vpls);
-        r->vpl_count = r->first_vpls = 0;
+    if (in->no_vpls || !r->light_count) {
+        es_plan_not_needed(plan, ES_PASS_VPLS, in->no_vpls ? in->no_vpls : "no light is on");
+        r->vpl_count = r->first_vpls = r->punctual_vpls = 0;
         return ES_OK;
     }
+    r->first_vpls = r->punctual_vpls;
     /* an update of stable lights is a step in time: all pictures of a frame have the first one's, whether work is skipped or not */
     if (picture && r->settings.stable_vpls && plan->valid[ES_PASS_VPLS]) {
         plan->stats[ES_PASS_VPLS].skipped = "the lights are those of the frame's first picture";
@@ -300,7 +301,7 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_w
     uint64_t unsettled = stable && !r->stable.settled ? r->frames + 1 : 0;
     es_plan_reads(plan, &unsettled, sizeof unsettled);
     if (!es_plan_run(plan, ES_PASS_VPLS)) return ES_OK;
-    es_result result = reserve_vpls(r, es_bounce_capacity(&r->settings));
+    es_result result = es_reserve_vpls(r, es_bounce_capacity(&r->settings));
     es_arena_reset(&r->arena);
     es_receivers* receivers = by_view && !result ? es_arena_allocate(&r->arena, sizeof *receivers) : NULL;
     if (receivers) {
@@ -314,9 +315,10 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_w
     if (!result && stable) {
         es_stable_vpl_request of_stable = {.sample = request, .renew = r->settings.renew, .list = in->list, .extent = in->extent, .scene = scene_hash(in), .materials = in->revisions.materials};
         es_world_origin(world, of_stable.origin);
-        result = es_stable_vpls_update(r->context, &r->stable, r->light_views, r->light_count, r->importances, &of_stable, r->vpls, &r->first_vpls);
+        result = es_stable_vpls_update(r->context, &r->stable, r->light_views, r->light_count, r->importances, &of_stable, r->vpls, &r->punctual_vpls);
     } else if (!result) es_stable_vpls_free(r->context, &r->stable);
-    if (!result && !stable) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->first_vpls);
+    if (!result && !stable) result = es_vpls_sample(r->context, r->light_views, r->light_count, r->importances, &request, r->vpls, &r->punctual_vpls);
+    r->first_vpls = r->punctual_vpls;
     if (!result) es_plan_done(plan, ES_PASS_VPLS, r->first_vpls);
     return result;
 }
@@ -357,12 +359,19 @@ static uint32_t subset_count(const es_renderer_settings* s, bool lamps)
 
 static const char* no_maps(const es_renderer* r, const es_frame_inputs* in) { return in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing"; }
 
+/* Before lamps' bounce has placed its lights. */
+static bool wants_points(const es_renderer* r, const es_frame_inputs* in)
+{
+    const es_renderer_settings* s = &r->settings;
+    return !in->no_vpls && (r->first_vpls || es_lamps_bounce(r, in)) && (es_draws_imperfect_maps(s) || es_bounce_wants_points(s));
+}
+
 static es_result pass_scene_points(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const char* none = no_maps(r, in);
-    const bool lamps = es_lamps_want_maps(r), points = lamps || (!none && (es_draws_imperfect_maps(s) || es_bounce_wants_points(s)));
+    const bool lamps = es_lamps_want_maps(r), points = lamps || wants_points(r, in);
     if (!points) {
         es_plan_not_needed(plan, ES_PASS_POINTS, none ? none : "gi is not ism");
         return ES_OK;
@@ -393,6 +402,7 @@ static es_result pass_maps(es_renderer* r, const es_frame_inputs* in)
     const es_pass pass = imperfect ? ES_PASS_ISM : ES_PASS_CLASSIC;
     es_plan_begin(plan, pass);
     es_plan_reads_pass(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_BOUNCE);
     if (imperfect) {
         es_plan_reads_pass(plan, ES_PASS_POINTS);
         float numbers[] = {(float)s->ism_size, s->pull_push, s->pull_threshold, s->push_threshold, (float)s->pull_push_levels, in->extent};
@@ -492,6 +502,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = pass_scene_points(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
     if (!result) result = es_pass_lamp_maps(r, in);
+    if (!result) result = es_pass_lamp_bounce(r, in);
     if (!result) result = pass_maps(r, in);
     if (!result) result = es_pass_bounces(r, in);
     if (!result) result = es_pass_points(r, in);
@@ -510,7 +521,9 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
 
 static void why_no_light(const es_renderer_settings* s, es_frame_inputs* in)
 {
-    in->no_indirect = s->bounces == 0 ? "bounces is 0" : s->vpls == 0 ? "vpl.count is 0" : !in->light_count ? "no light is on" : !in->has_geometry ? "nothing to light" : NULL;
+    in->may_have_lamps = s->lamps != ES_LAMPS_NONE && (in->has_environment || es_something_glows(in->list));
+    const bool of_lamps = in->may_have_lamps && s->lamp_vpls;
+    in->no_indirect = s->bounces == 0 ? "bounces is 0" : !s->vpls && !of_lamps ? "vpl.count is 0" : !in->light_count && !of_lamps ? "no light is on" : !in->has_geometry ? "nothing to light" : NULL;
     in->no_vpls = in->no_indirect;
     if (s->method == ES_GI_NONE) in->no_indirect = in->no_vpls = "gi is none";
     if (s->method != ES_GI_MICRO) return;
@@ -561,7 +574,7 @@ es_result es_renderer_render(es_renderer* renderer, es_world* world)
     if (result) {
         es_plan_invalidate(&renderer->plan); /* a pass may have stopped halfway */
         renderer->complete = false;
-        renderer->vpl_count = renderer->first_vpls = renderer->light_count = 0;
+        renderer->vpl_count = renderer->first_vpls = renderer->punctual_vpls = renderer->light_count = 0;
         renderer->stats.bounce_count = 0;
         return result;
     }

@@ -65,7 +65,8 @@ struct es_renderer {
 
     es_vpl_record* vpls;
     uint32_t vpl_count, vpl_capacity; /* of all bounces, one after another */
-    uint32_t first_vpls;       /* of the first bounce */
+    uint32_t first_vpls;       /* of the first bounce, … */
+    uint32_t punctual_vpls;    /* … of these those of lights without a size, which come before those of lamps */
     es_bounce_stats bounces[ES_MAX_BOUNCES];
     es_stable_vpls stable;     /* places of the lights, with vpl.stable: the only thing that frames leave to later ones but what they need not compute again */
 
@@ -107,6 +108,7 @@ typedef struct es_frame_inputs {
     float extent;            /* diagonal of the world's bounds, metres */
     bool has_geometry;
     const char* no_indirect; /* why there is no indirect light; NULL: there is */
+    bool may_have_lamps;     /* something glows, or there is an environment, and lamps are wanted */
     const char* no_vpls;     /* why there are no virtual point lights; NULL: there are, if light reaches anything */
 } es_frame_inputs;
 

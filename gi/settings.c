@@ -75,6 +75,7 @@ static const es_setting renderer_table[] = {
     {"lamps.count", ES_SETTING_INT, "512", 1, 16384, NULL, "lights that stand for all glowing surfaces and the environment", AT(lamp_count)},
     {"lamps.size", ES_SETTING_INT, "128", 32, 256, NULL, "texels of a side of a lamp's imperfect shadow map: 32, 64, 128 or 256", AT(lamp_size)},
     {"lamps.interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern of lamps' light", AT(lamp_interleave)},
+    {"lamps.vpls", ES_SETTING_INT, "256", 0, 16384, NULL, "virtual point lights of the first bounce of lamps' light", AT(lamp_vpls)},
     {"lamps.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "lobes sharper than this are widened to it, or each of a lamp's lights would show as a spot", AT(lamp_roughness)},
     {"lamps.slope-bias", ES_SETTING_FLOAT, "0.026", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(lamp_slope_bias)},
 

@@ -53,7 +53,7 @@ es_surface es_widened_lobe(es_surface surface, float lobe_roughness)
 
 static es_shade_light light_of(const es_vpl_record* vpl, float scale, float spread, float lobe_roughness)
 {
-    es_shade_light light = {.spread = vpl->area * (0.318309886f * spread), .model = vpl->model, .glossy = vpl->glossy};
+    es_shade_light light = {.spread = vpl->area * (0.318309886f * spread), .model = vpl->model, .glossy = vpl->glossy, .parallel = vpl->parallel};
     light.roughness = widened(vpl->model, vpl->roughness, lobe_roughness);
     memcpy(light.position, vpl->position, sizeof light.position);
     memcpy(light.normal, vpl->normal, sizeof light.normal);

@@ -20,6 +20,9 @@
  * order along a curve through space, and the numbers that choose are spread evenly over each neighbourhood of pixels, so that it
  * takes its lights from everywhere.
  *
+ * A parallel light (es_vpl_record.parallel) has G = cos_pixel and a map of its own projection (raster/points.h):
+ *     V = depth along the light <= map + bias + slope_bias / cos_pixel
+ *
  * The pixel's own diffuse reflectance, albedo · (1 - metallic) / pi, is applied after the filter. Lobes (gi/surface.h): a glossy light
  * sends power · f(incident, d) instead of flux / pi; a pixel with a lobe has a second sum, the radiance its lobe reflects to the
  * eye, and its irradiance is what passes to the diffuse part.
@@ -65,6 +68,7 @@ typedef struct es_shade_job {
     uint32_t dark_count;           /* the last so many records send nothing; where one is sampled they are chosen as if they did */
     const uint16_t* maps;          /* map v at maps + v · map_size²; NULL: everything sees everything */
     const es_shade_visibility* visibility; /* in place of maps; NULL: by the maps */
+    const uint32_t* map_of;        /* each light's map; NULL: they are in order */
     uint32_t map_size;
     float far_distance;            /* of the maps */
     float bias, slope_bias;        /* metres */
@@ -105,7 +109,7 @@ typedef struct es_shade_light {
     float power[3];                /* n² · power; what follows is used when glossy */
     float incident[3], specular_color[3], roughness;
     uint32_t model;
-    bool glossy;
+    bool glossy, parallel;
     /* sampled */
     float weight;                  /* luminance of what the light sends */
     uint32_t record;               /* place among es_shade_job.vpls: lights of a phase are in another order */

@@ -17,6 +17,7 @@ typedef struct es_vpl_record {
     float roughness;     /* GGX roughness; Phong: exponent */
     uint32_t model;      /* es_surface_model */
     bool glossy;         /* has a lobe besides the diffuse part worth evaluating */
+    bool parallel;       /* infinitely far away: sends along the normal, flux / pi is its irradiance on what faces it, W/m²; the position is where depths of its map begin */
 } es_vpl_record;
 
 #endif

@@ -5,6 +5,8 @@
  * through. */
 #include "gi/vpl_visibility.h"
 
+#include <math.h>
+
 /* How far from a light's position its triangle is looked for, share of the extent: rasterized and traced depths differ where triangles
  * are seen at a slant. */
 #define SEARCH_SHARE 1e-3f
@@ -52,10 +54,15 @@ static void test(const es_shade_visibility* shade, uint32_t vpl, es_shade_batch*
     for (uint32_t i = 0; i < lanes; i++) {
         float dx = b->px[i] - position.x, dy = b->py[i] - position.y, dz = b->pz[i] - position.z;
         float light_side = dx * normal.x + dy * normal.y + dz * normal.z, pixel_side = dx * b->nx[i] + dy * b->ny[i] + dz * b->nz[i];
+        if (light->parallel) {
+            light_side = 1.0f;
+            pixel_side = normal.x * b->nx[i] + normal.y * b->ny[i] + normal.z * b->nz[i];
+        }
         b->visible[i] = 0;
         if (!(light_side > 0.0f && pixel_side < 0.0f)) continue;
-        /* from the light: neighbours then share their origin */
-        rays[count] = (es_ray){{end.x, end.y, end.z}, 0.0f, {b->ox[i] - end.x, b->oy[i] - end.y, b->oz[i] - end.z}, 1.0f};
+        /* from the light: neighbours then share their origin, or their direction */
+        rays[count] = light->parallel ? (es_ray){{b->ox[i], b->oy[i], b->oz[i]}, 0.0f, {-normal.x, -normal.y, -normal.z}, INFINITY}
+                                      : (es_ray){{end.x, end.y, end.z}, 0.0f, {b->ox[i] - end.x, b->oy[i] - end.y, b->oz[i] - end.z}, 1.0f};
         places[count++] = i;
         if (count < RUN) continue;
         test_run(visibility->scene, ES_RAYS_COHERENT, rays, places, count, b->visible);
@@ -88,7 +95,8 @@ typedef struct ends_job { es_vpl_visibility* visibility; float extent; } ends_jo
 static void find_ends(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     ends_job* job = user;
-    for (uint32_t i = begin; i < end; i++) job->visibility->ends[i] = end_of(job->visibility->scene, &job->visibility->vpls[i], job->extent);
+    for (uint32_t i = begin; i < end; i++)
+        job->visibility->ends[i] = job->visibility->vpls[i].parallel ? es_v3(0, 0, 0) : end_of(job->visibility->scene, &job->visibility->vpls[i], job->extent);
 }
 
 es_result es_vpl_visibility_prepare(es_arena* arena, const es_trace_scene* scene, const es_vpl_record* vpls, uint32_t count, float extent, es_vpl_visibility* visibility)

@@ -7,6 +7,10 @@
  *     texel  = ((u, v) + 1) / 2 · size       rows of `size` texels, v downwards
  *     depth  = round(r / far · ES_PARABOLIC_DEPTH_MAX), ES_PARABOLIC_EMPTY where nothing was drawn; the smaller wins
  *
+ * A parallel map is what a light at infinity sees along the normal of a square about the position, far × far:
+ *
+ *     (u, v) = (q.x, q.y) · 2 / far,   depth = round(q.z / far · ES_PARABOLIC_DEPTH_MAX)
+ *
  * The largest depth leaves a gap of a quarter of the range below EMPTY: no threshold (at most a third of far) bridges it, so
  * "close to" never holds between a depth and EMPTY and the filters need no separate test for holes. 49151 steps over a scene
  * of 50 m are 1 mm each.
@@ -38,11 +42,12 @@ typedef struct es_parabolic_map {
     float near_distance;   /* points closer are not drawn */
     float splat_width;     /* metres: the side of the square a point stands for */
     uint32_t size;         /* texels of a side, 4 … ES_PARABOLIC_MAX_SIZE */
+    bool parallel;         /* of a light that is infinitely far away, see below; near_distance is not used */
 } es_parabolic_map;
 
 /* Draws the points of `points` into work[0 … size²), which the caller has filled with EMPTY or with other points: a box of
  * 1 … 4 texels each, as wide as the point's square appears: under the projection dtheta becomes (1 + u² + v²) / 2 · dtheta,
- * which is r / (r + q.z) · dtheta, so a width w at distance r covers w / (r + q.z) · size / 2 texels. Boxes are moved inside
+ * which is r / (r + q.z) · dtheta, so a width w at distance r covers w / (r + q.z) · size / 2 texels; of a parallel map w / far · size. Boxes are moved inside
  * the map at its border. Texels after size² are written with what they held: es_splat_texels(size) must be there. */
 static inline size_t es_splat_texels(uint32_t size) { return (size_t)size * size + 3 * (size_t)size + 16; }
 

@@ -86,6 +86,7 @@ static es_shade_light random_light(bool glossy)
         light.specular_color[k] = uniform(0, 1);
     }
     if (random_bits() % 16 == 0) light.position[random_bits() % 3] = 1e15f;
+    if (random_bits() % 4 == 0) light.glossy = !(light.parallel = true);
     return light;
 }
 
@@ -125,7 +126,9 @@ static void check_shade(void** state)
         for (uint32_t v = 0; v < count; v++) lights[v] = random_light(trial % 2);
         uint16_t* maps = malloc((size_t)count * size * size * 2 + 2);
         for (size_t i = 0; i < (size_t)count * size * size; i++) maps[i] = random_bits() % 4 ? (uint16_t)(random_bits() % 49152) : 65535;
-        es_shade_job job = {.gbuffer = &g, .rays = random_rays(trial % 5 == 1, width, height), .vpl_count = count, .maps = shadowed ? maps : NULL, .map_size = size,
+        uint32_t* map_of = malloc((count + 1) * sizeof *map_of);
+        for (uint32_t v = 0; v < count; v++) map_of[v] = random_bits() % count;
+        es_shade_job job = {.gbuffer = &g, .rays = random_rays(trial % 5 == 1, width, height), .vpl_count = count, .maps = shadowed ? maps : NULL, .map_of = trial % 7 ? NULL : map_of, .map_size = size,
             .far_distance = 6, .bias = 0.05f, .geometry_bound = uniform(0.1f, 50), .interleave = 1 + trial % 16};
         plane expected[6], result[6];
         for (int k = 0; k < 6; k++) {
@@ -150,6 +153,7 @@ static void check_shade(void** state)
             free(result[k].memory);
         }
         free(maps);
+        free(map_of);
         free(lights);
         free_gbuffer(&g);
     }

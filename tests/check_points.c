@@ -60,6 +60,7 @@ static es_parabolic_map random_map(uint32_t size)
     for (int k = 0; k < 3; k++) map.position[k] = uniform(-1, 1);
     if (random_bits() % 8 == 0) map.position[random_bits() % 3] = wild(1.0f);
     if (random_bits() % 16 == 0) map.splat_width = wild(1.0f);
+    map.parallel = random_bits() % 3 == 0;
     return map;
 }
 

@@ -34,7 +34,7 @@ VINL vf facing(const es_bounce_sender* s, vf cosine, vi albedo_b)
 }
 
 /* weights[i] = luminance of I(d) cos / r² a V (albedo + specular), V being 1 or `doubt`, sums[i / 8] the sum of eight. Both are written up to the next multiple of eight. */
-void ES_KERNEL(es_gi_bounce_weights)(const es_bounce_sender* s, const es_surfel_set* points, float* weights, float* sums)
+VINL void weigh(const es_bounce_sender* s, const es_surfel_set* points, float* weights, float* sums, bool parallel)
 {
     const vf zero = vf_zero(), half = vf_set1(0.5f * (float)s->map_size), last = vf_set1((float)s->map_size - 0.5f), near2 = vf_set1(s->near_distance * s->near_distance);
     const vf depth_scale = vf_set1((float)ES_PARABOLIC_DEPTH_MAX / s->far_distance);
@@ -45,34 +45,41 @@ void ES_KERNEL(es_gi_bounce_weights)(const es_bounce_sender* s, const es_surfel_
         vf nx, ny, nz;
         es_unpack_normal_v(vi_load(points->normal + i), &nx, &ny, &nz);
         vi albedo_b = vi_load(points->albedo_b + i);
-        vf received = facing(s, vf_neg(dx * nx + dy * ny + dz * nz), albedo_b); /* times r */
-        vm lit = vm_gt(qz, zero) & vm_gt(received, zero);
+        vf received = parallel ? facing(s, vf_neg(vf_set1(s->normal[0]) * nx + vf_set1(s->normal[1]) * ny + vf_set1(s->normal[2]) * nz), albedo_b) : facing(s, vf_neg(dx * nx + dy * ny + dz * nz), albedo_b); /* times r */
+        vm lit = parallel ? vm_gt(received, zero) : vm_gt(qz, zero) & vm_gt(received, zero);
         if (points->count - i < VW) lit &= vm_first((int32_t)(points->count - i));
         vf weight = zero;
         if (vm_any(lit)) {
-            vf r2 = vf_max(dx * dx + dy * dy + dz * dz, near2), r = vf_sqrt(r2), share = vf_set1(1.0f);
+            vf r2 = parallel ? vf_set1(1.0f) : vf_max(dx * dx + dy * dy + dz * dz, near2), r = vf_sqrt(r2), share = vf_set1(1.0f);
             if (s->map) {
                 vf qx = dx * vf_set1(s->tangent[0]) + dy * vf_set1(s->tangent[1]) + dz * vf_set1(s->tangent[2]);
                 vf qy = dx * vf_set1(s->bitangent[0]) + dy * vf_set1(s->bitangent[1]) + dz * vf_set1(s->bitangent[2]);
-                vf to_texel = half / (r + vf_max(qz, zero));
+                vf to_texel = parallel ? vf_set1((float)s->map_size / s->far_distance) : half / (r + vf_max(qz, zero)), along = parallel ? qz : r;
                 vi x = vi_truncate(vf_max(vf_min(qx * to_texel + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * to_texel + half, last), zero));
                 vi at = y * vi_set1((int32_t)s->map_size) + x;
                 uint32_t place[VW];
                 vi depth;
                 vi_store(place, at);
                 for (int k = 0; k < VW; k++) depth[k] = s->map[place[k]];
-                vm seen = vm_le((r * depth_scale - bias) * received - slope_bias * r, vf_from_int(depth) * received);
+                vm seen = vm_le((along * depth_scale - bias) * received - slope_bias * r, vf_from_int(depth) * received);
                 share = vf_select(seen, share, vf_set1(s->doubt));
             }
             vf inverse = vf_set1(1.0f) / r, sent[3], reflected[3];
-            sent_towards(s, dx * inverse, dy * inverse, dz * inverse, sent);
+            if (parallel) for (int k = 0; k < 3; k++) sent[k] = vf_set1(s->color[k]);
+            else sent_towards(s, dx * inverse, dy * inverse, dz * inverse, sent);
             reflectance(vi_load(points->albedo_rg + i), albedo_b, vi_load(points->surface + i), reflected);
-            vf g = vf_load(points->area + i) * (qz * inverse) * (received * inverse) * (inverse * inverse);
+            vf g = parallel ? vf_load(points->area + i) * received : vf_load(points->area + i) * (qz * inverse) * (received * inverse) * (inverse * inverse);
             weight = vf_and(lit, share * g * (sent[0] * reflected[0] + sent[1] * reflected[1] + sent[2] * reflected[2]));
         }
         vf_store(weights + i, weight);
         sums[i / VW] = vf_sum(weight);
     }
+}
+
+void ES_KERNEL(es_gi_bounce_weights)(const es_bounce_sender* s, const es_surfel_set* points, float* weights, float* sums)
+{
+    if (s->parallel) weigh(s, points, weights, sums, true);
+    else weigh(s, points, weights, sums, false);
 }
 
 /* ---- reflective maps ------------------------------------------------------------------------------------------------------- */

@@ -267,6 +267,59 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
     }
 }
 
+/* Light from infinitely far away. No distance is found and nothing divided: one loop does. */
+VINL void apply_parallel(const es_shade_job* job, const es_shade_light* light, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, enum shadow shadow, bool lobes)
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f);
+    const vf ox = vf_set1(light->position[0]), oy = vf_set1(light->position[1]), oz = vf_set1(light->position[2]);
+    const vf nx = vf_set1(light->normal[0]), ny = vf_set1(light->normal[1]), nz = vf_set1(light->normal[2]);
+    const vf tx = vf_set1(light->tangent[0]), ty = vf_set1(light->tangent[1]), tz = vf_set1(light->tangent[2]);
+    const vf bx = vf_set1(light->bitangent[0]), by = vf_set1(light->bitangent[1]), bz = vf_set1(light->bitangent[2]);
+    const vf sent[3] = {vf_set1(light->color[0]), vf_set1(light->color[1]), vf_set1(light->color[2])};
+    const vf half = vf_set1(0.5f * (float)job->map_size), last = vf_set1((float)job->map_size - 0.5f), step = vf_set1((float)job->map_size / job->far_distance);
+    const vf depth_scale = vf_set1((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance);
+    const vf bias = vf_set1(job->bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance)), slope_bias = vf_set1(job->slope_bias * ((float)ES_PARABOLIC_DEPTH_MAX / job->far_distance));
+    const vi size = vi_set1((int32_t)job->map_size);
+    for (uint32_t i = 0; i < lanes; i += VW) {
+        vf cosine = vf_neg(nx * vf_load(batch->nx + i) + ny * vf_load(batch->ny + i) + nz * vf_load(batch->nz + i));
+        vm lit = vm_gt(cosine, zero);
+        if (shadow == SHADOW_BY_RAYS) lit &= vi_load(batch->visible + i);
+        if (!vm_any(lit)) continue;
+        if (shadow == SHADOW_BY_MAP) {
+            vf dx = vf_load(batch->px + i) - ox, dy = vf_load(batch->py + i) - oy, dz = vf_load(batch->pz + i) - oz;
+            vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz, qz = dx * nx + dy * ny + dz * nz;
+            vi x = vi_truncate(vf_max(vf_min(qx * step + half, last), zero)), y = vi_truncate(vf_max(vf_min(qy * step + half, last), zero));
+            vf depth = vf_from_int(vi_gather16(map, y * size + x));
+            lit &= vm_le((qz * depth_scale - bias) * cosine - slope_bias, depth * cosine);
+        }
+        const vf g = vf_and(lit, cosine);
+        vf pass = one;
+        if (lobes && batch->lobed[i / VW]) {
+            if (!vm_any(lit)) continue;
+            es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
+                .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
+            vf lobe[3];
+            es_surface_parts_v(&surface, vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i), vf_neg(nx), vf_neg(ny), vf_neg(nz),
+                vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i), &pass, lobe);
+            for (int k = 0; k < 3; k++) vf_store(batch->s[k] + i, vf_load(batch->s[k] + i) + vf_and(lit, g * sent[k] * lobe[k]));
+            for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_load(batch->e[k] + i) + vf_and(lit, g * sent[k] * pass));
+            continue;
+        }
+        for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_load(batch->e[k] + i) + g * sent[k]);
+    }
+}
+
+static void apply_from_infinity(const es_shade_job* job, const es_shade_light* light, uint32_t vpl, const uint16_t* map, es_shade_batch* batch, uint32_t lanes, bool lobes)
+{
+    if (job->visibility) job->visibility->test(job->visibility, vpl, batch, lanes);
+    if (job->visibility && lobes) apply_parallel(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, true);
+    else if (job->visibility) apply_parallel(job, light, NULL, batch, lanes, SHADOW_BY_RAYS, false);
+    else if (map && lobes) apply_parallel(job, light, map, batch, lanes, SHADOW_BY_MAP, true);
+    else if (map) apply_parallel(job, light, map, batch, lanes, SHADOW_BY_MAP, false);
+    else if (lobes) apply_parallel(job, light, NULL, batch, lanes, NO_SHADOW, true);
+    else apply_parallel(job, light, NULL, batch, lanes, NO_SHADOW, false);
+}
+
 /* ---- sampled lights -------------------------------------------------------------------------------------------------- */
 
 /* What a light would send to eight pixels, as luminance: G times its weight. */
@@ -438,6 +491,11 @@ static void darken(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
     }
 }
 
+static inline const uint16_t* map_of(const es_shade_job* job, uint32_t light, size_t texels)
+{
+    return job->maps ? job->maps + (job->map_of ? job->map_of[light] : light) * texels : NULL;
+}
+
 static void shade_phase(const es_shade_job* job, const es_shade_light* lights, const lanes_of_phase* p, uint32_t phase, es_shade_batch* batch)
 {
     const uint32_t n = job->interleave, lanes = p->lanes * p->rows;
@@ -455,12 +513,16 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
     }
     for (uint32_t v = phase; v < lit && !job->sampled; v += n * n) {
         const es_shade_light* light = &lights[v];
-        const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
+        const uint16_t* map = map_of(job, v, map_texels);
         const enum shadow shadow = map ? SHADOW_BY_MAP : NO_SHADOW;
+        if (light->parallel) {
+            apply_from_infinity(job, light, v, map, batch, lanes, lobes);
+            continue;
+        }
         if (job->visibility) apply_traced(job, light, v, batch, lanes, lobes);
         else if (lobes && light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, true, ALL_PIXELS);
         else if (light->glossy) apply_light(job, light, map, batch, lanes, shadow, true, false, ALL_PIXELS);
-        else if (map) apply_diffuse(job, light, map, v + n * n < lit ? map + n * n * map_texels : map, batch, lanes, true, lobes);
+        else if (map) apply_diffuse(job, light, map, v + n * n < lit ? map_of(job, v + n * n, map_texels) : map, batch, lanes, true, lobes);
         else apply_diffuse(job, light, NULL, NULL, batch, lanes, false, lobes);
         /* a batch has few pixels with lobes, if any: they are apart, so that the others keep their short loops */
         if (lobes && !job->visibility && !light->glossy) apply_light(job, light, map, batch, lanes, shadow, false, true, PIXELS_WITH_LOBES);
@@ -503,9 +565,10 @@ void ES_KERNEL(es_gi_shade_points)(const es_shade_job* job, const es_shade_light
 {
     const size_t map_texels = (size_t)job->map_size * job->map_size;
     for (uint32_t v = begin; v < end; v++) {
-        const uint16_t* map = job->maps ? job->maps + v * map_texels : NULL;
-        if (lights[v].glossy) apply_light(job, &lights[v], map, batch, lanes, map ? SHADOW_BY_MAP : NO_SHADOW, true, false, ALL_PIXELS);
-        else if (map) apply_diffuse(job, &lights[v], map, v + 1 < end ? map + map_texels : map, batch, lanes, true, false);
+        const uint16_t* map = map_of(job, v, map_texels);
+        if (lights[v].parallel) apply_from_infinity(job, &lights[v], v, map, batch, lanes, false);
+        else if (lights[v].glossy) apply_light(job, &lights[v], map, batch, lanes, map ? SHADOW_BY_MAP : NO_SHADOW, true, false, ALL_PIXELS);
+        else if (map) apply_diffuse(job, &lights[v], map, v + 1 < end ? map_of(job, v + 1, map_texels) : map, batch, lanes, true, false);
         else apply_diffuse(job, &lights[v], NULL, NULL, batch, lanes, false, false);
     }
 }

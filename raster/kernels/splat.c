@@ -51,7 +51,7 @@ static void draw_large(const splat_queue* queue, uint16_t* work, uint32_t size)
     }
 }
 
-void ES_KERNEL(es_splat_parabolic_map)(const es_parabolic_map* map, const es_point_set* points, uint16_t* work)
+VINL void splat(const es_parabolic_map* map, const es_point_set* points, uint16_t* work, bool parallel)
 {
     const float *t = map->tangent, *b = map->bitangent, *n = map->normal, *o = map->position;
     const vf tx = vf_set1(t[0]), ty = vf_set1(t[1]), tz = vf_set1(t[2]);
@@ -74,10 +74,10 @@ void ES_KERNEL(es_splat_parabolic_map)(const es_parabolic_map* map, const es_poi
             vf qx = dx * tx + dy * ty + dz * tz, qy = dx * bx + dy * by + dz * bz, qz = dx * nx + dy * ny + dz * nz;
             vf r2 = dx * dx + dy * dy + dz * dz;
             /* false for NaN and infinity, too */
-            vm drawn = vm_gt(qz, vf_zero()) & vm_ge(r2, near2) & vm_lt(r2, far2);
+            vm drawn = parallel ? vm_gt(qz, vf_zero()) & vm_lt(qz, vf_set1(map->far_distance)) : vm_gt(qz, vf_zero()) & vm_ge(r2, near2) & vm_lt(r2, far2);
             if (points->count - i < VW) drawn &= vm_first((int32_t)(points->count - i));
-            vf r = vf_sqrt(r2);
-            vf s = vf_set1(1.0f) / vf_select(drawn, r + qz, vf_set1(map->far_distance));
+            vf r = parallel ? vf_and(drawn, qz) : vf_sqrt(r2);
+            vf s = parallel ? vf_set1(2.0f / map->far_distance) : vf_set1(1.0f) / vf_select(drawn, r + qz, vf_set1(map->far_distance));
             vi width = vi_round(vf_clamp(width_scale * s, vf_set1(1.0f), vf_set1(4.0f)));
             vf w = vf_from_int(width);
             vf first = corner - vf_set1(0.5f) * w, last = side - w;
@@ -94,4 +94,10 @@ void ES_KERNEL(es_splat_parabolic_map)(const es_parabolic_map* map, const es_poi
         draw_small(&small, work, map->size);
         draw_large(&large, work, map->size);
     }
+}
+
+void ES_KERNEL(es_splat_parabolic_map)(const es_parabolic_map* map, const es_point_set* points, uint16_t* work)
+{
+    if (map->parallel) splat(map, points, work, true);
+    else splat(map, points, work, false);
 }
