@@ -118,6 +118,11 @@ typedef struct es_renderer_settings {
     float filter_depth;              /* largest relative depth difference (Knecht: 0.01) */
     float filter_normal;             /* smallest dot product of normals (Knecht: 0.8) */
     bool half_resolution;            /* but of MICRO: indirect light is shaded and filtered for one pixel of 2 × 2, and interpolated along surfaces for the others */
+    /* screen space (Ritschel thesis §4) */
+    uint32_t screen_samples;         /* places that each pixel looks at around it */
+    uint32_t screen_sets;            /* n of n × n patterns of such places, which a filter of that size brings together */
+    float screen_radius;             /* how far away they are at the most, share of the scene's extent */
+    bool screen_bounce;              /* light that surfaces within the radius send each other: what geometry_bound leaves out, then with spread 0; with NONE all; not with MICRO */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */

@@ -19,6 +19,8 @@
 #include "gi/micro/upsample.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
+#include "gi/screen/directional_occlusion.h"
+#include "gi/screen/screen_bounce.h"
 #include "gi/shade.h"
 #include "gi/temporal.h"
 #include "gi/view_importance.h"
@@ -47,6 +49,10 @@
     X(reflective_weights, (const es_bounce_sender* sender, const es_surfel_set* points, const es_reflective_map* map, float* weights, float* sums)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
+    X(screen_occlusion, (const es_occlusion_job* job, uint32_t row_begin, uint32_t row_end))                     \
+    X(screen_bounce, (const es_screen_bounce_job* job, uint32_t row_begin, uint32_t row_end))                    \
+    X(screen_light, (const es_screen_light_job* job, uint32_t row_begin, uint32_t row_end))                      \
+    X(screen_reflect, (const es_screen_reflect_job* job, uint32_t row_begin, uint32_t row_end))                  \
     X(antialias, (const es_antialias_job* job, uint32_t row_begin, uint32_t row_end))                            \
     /* a row of tiles */                                                                                          \
     X(temporal_compare, (const es_temporal_job* job, uint32_t tile_row, float* shares))                          \

@@ -35,6 +35,7 @@
     X(FILTER, "filter", "pixels")                                                                                \
     X(TEMPORAL, "temporal coherence", "pixels")                                                                  \
     X(UPSAMPLE, "upsample", "pixels")                                                                            \
+    X(SCREEN_BOUNCE, "screen-space bounce", "samples")                                                           \
     X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \
     X(COMPOSE, "compose", "pixels")
 

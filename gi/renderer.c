@@ -11,6 +11,7 @@
 #include "gi/lit.h"
 #include "gi/micro_passes.h"
 #include "gi/passes.h"
+#include "gi/screen/passes.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -104,6 +105,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_lamps_free_planes(context, &renderer->lamps);
     es_planes_free(context, &renderer->filtered_irradiance);
     es_planes_free(context, &renderer->filtered_specular);
+    es_screen_buffers_free(context, &renderer->screen);
 }
 
 void es_renderer_destroy(es_renderer* renderer)
@@ -457,6 +459,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (es_indirect_is_there(r)) job.irradiance[k] = irradiance->at[k];
         if (es_indirect_is_there(r) && r->has_specular) job.specular[k] = specular->at[k];
         if (r->plan.valid[ES_PASS_COMPENSATION]) job.further[ES_FURTHER_RAYS][k] = r->compensation.at[k];
+        if (r->plan.valid[ES_PASS_SCREEN_BOUNCE]) job.further[ES_FURTHER_BOUNCE][k] = r->screen.bounce.at[k];
         if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
     return job;
@@ -477,6 +480,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
+    es_plan_reads_pass(plan, ES_PASS_SCREEN_BOUNCE);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -496,6 +500,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     es_result result = pass_visibility(r, in);
     if (!result) result = es_pass_background(r, in);
     if (!result) result = es_pass_environment(r, in);
+    if (!result) result = es_pass_screen_views(r, in);
     if (!result) result = pass_light_views(r, in);
     if (!result) result = pass_vpls(r, in, world, picture);
     if (!result) result = es_pass_lamps(r, in);
@@ -516,6 +521,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_filter(r, in);
     if (!result && !first) result = es_pass_temporal(r, in);
     if (!result) result = es_pass_upsample(r, in);
+    if (!result) result = es_pass_screen_bounce(r, in);
     return result ? result : es_pass_antialias(r, picture);
 }
 

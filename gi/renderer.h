@@ -15,6 +15,7 @@
 #include "gi/plan.h"
 #include "gi/reference/scene.h"
 #include "gi/scene_points.h"
+#include "gi/screen/buffers.h"
 #include "gi/shade.h"
 #include "gi/stable_vpls.h"
 #include "gi/surfels.h"
@@ -81,6 +82,7 @@ struct es_renderer {
 
     es_planes background;      /* the environment where nothing is seen; kept while there is one */
     es_environment_map environment; /* valid when the pass is */
+    es_screen_buffers screen;
 
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;

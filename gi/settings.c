@@ -85,6 +85,11 @@ static const es_setting renderer_table[] = {
     {"filter.normal", ES_SETTING_FLOAT, "0.8", -1, 1, NULL, "smallest dot product of normals the filter crosses", AT(filter_normal)},
     {"half-resolution", ES_SETTING_BOOL, "false", 0, 1, NULL, "indirect light for one pixel of 2 × 2; the others are interpolated along their surface; not with gi micro", AT(half_resolution)},
 
+    {"screen.samples", ES_SETTING_INT, "8", 1, 64, NULL, "screen space: places that each pixel looks at around it", AT(screen_samples)},
+    {"screen.sets", ES_SETTING_INT, "4", 1, 8, NULL, "n of n × n patterns of such places, and of the filter that brings them together", AT(screen_sets)},
+    {"screen.radius", ES_SETTING_FLOAT, "0.05", 1e-6, 1, NULL, "how far away those places are at the most, share of the scene's extent", AT(screen_radius)},
+    {"screen.bounce", ES_SETTING_BOOL, "false", 0, 1, NULL, "light that surfaces within screen.radius send each other: what vpl.bound leaves out (vpl.spread is 0 then), with gi none all of it; not with gi micro", AT(screen_bounce)},
+
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},
     {"temporal.base", ES_SETTING_FLOAT, "0.9", 0, 0.999, NULL, "confidence in last frame's light where nothing changes", AT(temporal_base)},
