@@ -122,6 +122,10 @@ typedef struct es_renderer_settings {
     uint32_t screen_samples;         /* places that each pixel looks at around it */
     uint32_t screen_sets;            /* n of n × n patterns of such places, which a filter of that size brings together */
     float screen_radius;             /* how far away they are at the most, share of the scene's extent */
+    uint32_t screen_layers;          /* surfaces behind one another that each pixel knows of, 1 … 4: front faces at odd places, back faces at even ones (§4.3.2) */
+    uint32_t screen_cameras;         /* additional ones, 0 … 4, about the camera, of half its resolution (§4.3.3) */
+    uint32_t screen_repair;          /* places between a pixel and each light that its shadow map lets through, for what the map's depth bias leaves out (§4.5.1), and imperfect maps' (§4.5.2); 0: none */
+    float screen_repair_least;       /* how far from the pixel those places reach at least, share of the scene's extent: point lights' shadows in screen space (fig. 4.6); 0: as far as the bias does; of lights of imperfect maps it is not asked */
     bool screen_bounce;              /* light that surfaces within the radius send each other: what geometry_bound leaves out, then with spread 0; with NONE all; not with MICRO */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;

@@ -77,6 +77,11 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
         job.specular[k] = r->has_specular ? specular->at[k] : NULL;
     }
     job.lit = r->has_specular ? specular->lit : NULL;
+    if (s->screen_repair) {
+        job.repair = &r->screen.stack.views[0];
+        job.repair_samples = s->screen_repair;
+        job.repair_most = s->screen_radius * extent;
+    }
     es_arena_reset(&r->arena);
     es_vpl_visibility visibility;
     if (traced) {
@@ -119,7 +124,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_BOUNCES);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
     const uint32_t interleave = interleave_of(s);
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->screen_bounce ? 0.0f : s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed};
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->screen_bounce ? 0.0f : s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = ES_OK;

@@ -433,12 +433,13 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
-    float numbers[] = {(float)r->settings.shadow_filter, r->settings.shadow_bias, r->settings.shadow_slope_bias};
+    float numbers[] = {(float)r->settings.shadow_filter, r->settings.shadow_bias, r->settings.shadow_slope_bias, (float)r->settings.screen_repair, r->settings.screen_repair_least * in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_DIRECT)) return ES_OK;
     for (uint32_t i = 0; i < r->light_count; i++) {
         es_direct_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .view = &r->light_views[i], .shadow_filter = r->settings.shadow_filter, .shadow_bias = r->settings.shadow_bias,
-            .shadow_slope_bias = r->settings.shadow_slope_bias, .first = i == 0, .out = {r->direct.at[0], r->direct.at[1], r->direct.at[2]}};
+            .shadow_slope_bias = r->settings.shadow_slope_bias, .repair = r->settings.screen_repair ? &r->screen.stack.views[0] : NULL, .repair_samples = r->settings.screen_repair,
+            .repair_least = r->settings.screen_repair_least * in->extent, .first = i == 0, .out = {r->direct.at[0], r->direct.at[1], r->direct.at[2]}};
         es_direct_light(r->context, &job);
     }
     es_plan_done(plan, ES_PASS_DIRECT, r->light_count);

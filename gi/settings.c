@@ -88,6 +88,10 @@ static const es_setting renderer_table[] = {
     {"screen.samples", ES_SETTING_INT, "8", 1, 64, NULL, "screen space: places that each pixel looks at around it", AT(screen_samples)},
     {"screen.sets", ES_SETTING_INT, "4", 1, 8, NULL, "n of n × n patterns of such places, and of the filter that brings them together", AT(screen_sets)},
     {"screen.radius", ES_SETTING_FLOAT, "0.05", 1e-6, 1, NULL, "how far away those places are at the most, share of the scene's extent", AT(screen_radius)},
+    {"screen.layers", ES_SETTING_INT, "1", 1, 4, NULL, "surfaces behind one another that each pixel knows of; 2 and 4: where objects begin and end", AT(screen_layers)},
+    {"screen.cameras", ES_SETTING_INT, "0", 0, 4, NULL, "additional cameras, of half the resolution, that show what the camera does not", AT(screen_cameras)},
+    {"screen.repair", ES_SETTING_INT, "0", 0, 64, NULL, "places towards each light that are tested for what the depth bias of its shadow map leaves out; 0: none", AT(screen_repair)},
+    {"screen.repair-least", ES_SETTING_FLOAT, "0", 0, 1, NULL, "screen.repair: how far away from the pixel these places reach at least, share of the scene's extent; 0: as far as the bias", AT(screen_repair_least)},
     {"screen.bounce", ES_SETTING_BOOL, "false", 0, 1, NULL, "light that surfaces within screen.radius send each other: what vpl.bound leaves out (vpl.spread is 0 then), with gi none all of it; not with gi micro", AT(screen_bounce)},
 
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},

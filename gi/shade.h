@@ -31,6 +31,7 @@
 #define EARTHSHINE_GI_SHADE_H
 
 #include "gi/pixel_rays.h"
+#include "gi/screen/view_stack.h"
 #include "gi/surface.h"
 #include "gi/vpl.h"
 #include "platform/context.h"
@@ -78,6 +79,10 @@ typedef struct es_shade_job {
     uint32_t interleave;           /* n, 1 … ES_INTERLEAVE_MAX */
     bool sampled;                  /* with visibility: one light of its phase for each pixel */
     const es_shade_near* near;     /* NULL: none */
+    /* what bias and slope_bias of the maps leave out of shadows, found in screen space (Ritschel thesis §4.5.2); with maps, at pixels alone */
+    const es_screen_view* repair;  /* that shows the G-buffer's surfaces, at its resolution or another; NULL: nothing is */
+    uint32_t repair_samples;       /* of a segment towards the light as long as the bias, and as repair_most, metres, at the most */
+    float repair_most;
     uint32_t seed;                 /* of what is random with sampled and near */
     /* out, rows of gbuffer->stride; 0 where nothing is seen */
     float* irradiance[3];
@@ -139,6 +144,8 @@ struct es_shade_batch {
     int32_t light[ES_SHADE_LANES];     /* the chosen one, -1: none sends anything */
     int32_t chosen[ES_SHADE_LANES];    /* its record, or -1 */
     float share[ES_SHADE_LANES];       /* W / luminance */
+    /* with repair: the pixels as the view shows them */
+    float screen[9][ES_SHADE_LANES];
     /* of each phase of the row: depth, normal and surface of the G-buffer until the phase is shaded, its irradiance then */
     uint32_t words[3][ES_INTERLEAVE_MAX][ES_SHADE_PHASE_STRIDE];
 };

@@ -3,6 +3,7 @@
  */
 #include "gi/kernel_table.h"
 #include "gi/kernels/light_strength_simd.h"
+#include "gi/kernels/screen_test_simd.h"
 #include "gi/kernels/shadow_map_simd.h"
 #include "gi/kernels/surface_simd.h"
 #include "platform/simd.h"
@@ -109,6 +110,39 @@ static void shadow(const direct_row* row, stretch* s)
     }
 }
 
+/* Takes away what screen space shows to be hidden within the depth bias: of the light's axis, texels · width; along the ray to the light as much more as that is oblique,
+ * which for a perspective map makes it texels · slope times the distance. */
+static void repair(const direct_row* row, stretch* s)
+{
+    const es_direct_job* job = row->job;
+    const es_gbuffer* g = job->gbuffer;
+    const es_light_view* view = job->view;
+    const vf zero = vf_zero(), texels = vf_set1(job->shadow_bias), slope_texels = vf_set1(job->shadow_slope_bias * 0.5f * (float)job->shadow_filter);
+    const vf least = vf_set1(job->repair_least > 1e-6f ? job->repair_least : 1e-6f);
+    for (uint32_t i = 0; i < s->count; i++) {
+        const uint32_t at = i * VW, x = s->x[i];
+        const size_t pixel = (size_t)row->y * g->stride + x;
+        const vf strength = vf_load(s->strength + at);
+        const vm lit = vi_load(s->lanes + at) & vm_gt(strength, zero);
+        if (!vm_any(lit)) continue;
+        const vf towards[3] = {vf_load(s->towards[0] + at), vf_load(s->towards[1] + at), vf_load(s->towards[2] + at)};
+        const vf depth = vf_select(lit, vf_load(g->depth + pixel), vf_set1(1.0f));
+        vf p[3], d[3], n[3], away = vf_set1(1.0f);
+        place(row, x, depth, p, d);
+        if (!view->orthographic) {
+            const vf lx = vf_set1(view->light.position.x) - p[0], ly = vf_set1(view->light.position.y) - p[1], lz = vf_set1(view->light.position.z) - p[2];
+            away = vf_sqrt(lx * lx + ly * ly + lz * lz);
+        }
+        es_unpack_normal_v(vi_load(g->geometric_normal + pixel), &n[0], &n[1], &n[2]);
+        const vf bias = (texels + slope_texels * es_shadow_slope_v(vf_load(s->geometric + at))) * vf_set1(view->texel_slope) * away;
+        vf length = vf_max(bias, least);
+        if (!view->orthographic) length = vf_max(vf_min(length, away * vf_set1(0.5f)), vf_set1(1e-6f)); /* not beyond the light */
+        const es_screen_pixel_v at_pixel = es_screen_pixel_of_v(job->repair, vf_set1((float)x) + vf_iota(), vf_set1((float)row->y), depth, n);
+        const vf share = es_screen_segment_share_v(job->repair, &at_pixel, towards, length, job->repair_samples);
+        vf_store(s->strength + at, vf_and(lit, strength * share));
+    }
+}
+
 static void reflect(const direct_row* row, const stretch* s)
 {
     const es_direct_job* job = row->job;
@@ -159,6 +193,7 @@ void ES_KERNEL(es_gi_direct)(const es_direct_job* job, uint32_t row_begin, uint3
                 for (uint32_t i = x; i < end; i += VW) vf_store(job->out[k] + (size_t)y * g->stride + i, vf_zero());
             find_reached(&row, x, end, &s);
             shadow(&row, &s);
+            if (job->repair) repair(&row, &s);
             reflect(&row, &s);
         }
     }

@@ -91,17 +91,9 @@ VINL void add_patches(const es_screen_bounce_job* job, const es_screen_view* vie
 VINL receiver seen_by(const es_screen_view* view, const receiver* r, const vf triangle[3])
 {
     receiver s = *r;
-    const vf away = vf_set1(1e6f), depth = vf_max(es_screen_row_times_v(view->to_depth, r->p) + vf_set1(view->to_depth[3]), vf_set1(1e-6f));
-    vf x = es_screen_row_times_v(view->to_x, r->p) + vf_set1(view->to_x[3]), y = es_screen_row_times_v(view->to_y, r->p) + vf_set1(view->to_y[3]);
-    if (!view->rays.orthographic) {
-        x = x / depth;
-        y = y / depth;
-    }
-    x = vf_clamp(x, vf_neg(away), away);
-    y = vf_clamp(y, vf_neg(away), away);
-    s.pixel = es_screen_pixel_of_v(view, x, y, depth, triangle);
-    for (int k = 0; k < 3; k++) s.v[k] = vf_set1(view->rays.dir[k]) + x * vf_set1(view->rays.dir_dx[k]) + y * vf_set1(view->rays.dir_dy[k]);
-    s.inverse_depth = vf_set1(1.0f) / depth;
+    s.pixel = es_screen_pixel_at_v(view, r->p, triangle);
+    for (int k = 0; k < 3; k++) s.v[k] = vf_set1(view->rays.dir[k]) + s.pixel.x * vf_set1(view->rays.dir_dx[k]) + s.pixel.y * vf_set1(view->rays.dir_dy[k]);
+    s.inverse_depth = vf_set1(1.0f) / s.pixel.depth;
     return s;
 }
 

@@ -58,15 +58,7 @@ VINL void occlude_row(const es_occlusion_job* job, uint32_t y, bool simple, bool
                 dir[k] = vf_set1(view->rays.dir[k]) + fx * vf_set1(view->rays.dir_dx[k]) + fy * vf_set1(view->rays.dir_dy[k]);
                 p[k] = base[k] + d * dir[k];
             }
-            const vf h = es_screen_row_times_v(other->to_depth, p) + vf_set1(other->to_depth[3]), safe = vf_max(h, vf_set1(1e-6f));
-            vf px = es_screen_row_times_v(other->to_x, p) + vf_set1(other->to_x[3]), py = es_screen_row_times_v(other->to_y, p) + vf_set1(other->to_y[3]);
-            if (!other->rays.orthographic) {
-                px = px / safe;
-                py = py / safe;
-            }
-            /* places far outside the picture and behind the eye: no sample comes in from there */
-            const vf away = vf_set1(1e6f);
-            pixels[v] = es_screen_pixel_of_v(other, vf_clamp(px, vf_neg(away), away), vf_clamp(py, vf_neg(away), away), safe, t);
+            pixels[v] = es_screen_pixel_at_v(other, p, t);
         }
         vf sum[3] = {zero, zero, zero}, all[3] = {zero, zero, zero};
         const uint32_t column = x % job->sets;

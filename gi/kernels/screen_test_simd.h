@@ -122,4 +122,37 @@ VINL vf es_screen_blocked_v(const es_screen_view* view, const es_screen_pixel_v*
     return blocked;
 }
 
+/* Eight places of surfaces in the world, and their triangles' normals, as a view would show them. */
+VINL es_screen_pixel_v es_screen_pixel_at_v(const es_screen_view* view, const vf p[3], const vf n[3])
+{
+    /* far outside the picture and behind the eye: nothing near them comes in from there */
+    const vf away = vf_set1(1e6f), depth = vf_max(es_screen_row_times_v(view->to_depth, p) + vf_set1(view->to_depth[3]), vf_set1(1e-6f));
+    vf x = es_screen_row_times_v(view->to_x, p) + vf_set1(view->to_x[3]), y = es_screen_row_times_v(view->to_y, p) + vf_set1(view->to_y[3]);
+    if (!view->rays.orthographic) {
+        x = x / depth;
+        y = y / depth;
+    }
+    return es_screen_pixel_of_v(view, vf_clamp(x, vf_neg(away), away), vf_clamp(y, vf_neg(away), away), depth, n);
+}
+
+/* ---- shadows along a segment (thesis §4.5.1) ----------------------------------------------------------------------------------- */
+
+/* How much further than the depth bias the segment goes: there the fade begins. */
+#define ES_SCREEN_SEGMENT 1.4285715f /* 1 / √ES_SCREEN_FADE2 */
+
+/* The share of light that is left at eight pixels when `samples` places of a segment of that length (metres, more than 0) towards it are tested. */
+VINL vf es_screen_segment_share_v(const es_screen_view* view, const es_screen_pixel_v* pixel, const vf towards[3], vf length, uint32_t samples)
+{
+    const vf reach = length * vf_set1(ES_SCREEN_SEGMENT), inverse2 = vf_set1(1.0f) / (reach * reach), step = reach * vf_set1(1.0f / ((float)samples + 0.5f));
+    const vf along[3] = {es_screen_row_times_v(view->to_x, towards), es_screen_row_times_v(view->to_y, towards), es_screen_row_times_v(view->to_depth, towards)};
+    vf most = vf_zero();
+    for (uint32_t i = 0; i < samples; i++) {
+        const vf t = step * vf_set1((float)i + 0.75f);
+        const vf offset[3] = {along[0] * t, along[1] * t, along[2] * t};
+        vm unused;
+        most = vf_max(most, es_screen_blocked_v(view, pixel, offset, inverse2, view->layer_count == 1, &unused));
+    }
+    return vf_set1(1.0f) - most;
+}
+
 #endif

@@ -9,6 +9,7 @@
 
 #include "gi/kernel_table.h"
 #include "gi/kernels/phases_simd.h"
+#include "gi/kernels/screen_test_simd.h"
 #include "gi/kernels/surface_simd.h"
 #include "gi/lit.h"
 #include "gi/shade.h"
@@ -90,6 +91,13 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             vf_store(batch->nz + at, vf_and(seen, nz));
             for (int k = 0; k < 3; k++) vf_store(batch->e[k] + at, zero);
             if (job->visibility || job->near) ray_origins(g->geometric_normal + row, x, q, job->visibility ? job->visibility->offset : job->near->offset, batch, at);
+            if (job->repair) {
+                vf t[3];
+                es_unpack_normal_v(vi_gather(g->geometric_normal + row, x), &t[0], &t[1], &t[2]);
+                const es_screen_pixel_v s = es_screen_pixel_at_v(job->repair, q, t);
+                const vf numbers[9] = {s.x, s.y, s.depth, s.nv, s.nx, s.ny, s.vv, s.vx, s.vy};
+                for (int k = 0; k < 9; k++) vf_store(batch->screen[k] + at, numbers[k]);
+            }
             vi index = morton(x, y);
             if (job->sampled) vf_store(batch->choice + at, spread_number(job, index, 0x9e3779b9u, 3518319155u));
             if (job->near) {
@@ -125,6 +133,18 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
         }
     }
     *any_lobe = vm_any(lobes);
+}
+
+/* The share of light from `-d` (unit times r) that screen space leaves of what the map lets through. `cosine`: at the pixel. */
+static __attribute__((noinline)) vf repaired(const es_shade_job* job, const es_shade_batch* batch, uint32_t i, const vf d[3], vf r, vf cosine)
+{
+    es_screen_pixel_v s;
+    vf* const numbers[9] = {&s.x, &s.y, &s.depth, &s.nv, &s.nx, &s.ny, &s.vv, &s.vx, &s.vy};
+    for (int k = 0; k < 9; k++) *numbers[k] = vf_load(batch->screen[k] + i);
+    const vf inverse = vf_set1(-1.0f) / r, towards[3] = {d[0] * inverse, d[1] * inverse, d[2] * inverse};
+    vf length = vf_set1(job->bias) + vf_set1(job->slope_bias) / vf_max(cosine, vf_set1(0.02f));
+    length = vf_max(vf_min(vf_min(length, vf_set1(job->repair_most)), r * vf_set1(0.5f)), vf_set1(1e-6f));
+    return es_screen_segment_share_v(job->repair, &s, towards, length, job->repair_samples);
 }
 
 enum shadow { NO_SHADOW, SHADOW_BY_MAP, SHADOW_BY_RAYS };
@@ -166,6 +186,10 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
             lit &= vm_le((r * depth_scale - bias) * vf_neg(pixel_cos) - slope_bias * r, depth * vf_neg(pixel_cos));
         }
         vf g = vf_and(lit, vf_min(vf_neg(qz * pixel_cos) / (r2 * (r2 + spread)), bound));
+        if (shadow == SHADOW_BY_MAP && job->repair && vm_any(lit)) {
+            const vf d[3] = {dx, dy, dz};
+            g = g * repaired(job, batch, i, d, r, vf_neg(pixel_cos) / r);
+        }
         /* without F0 a lobe is 0 and lets everything pass: the same bits for less */
         const bool lobed = lobes && batch->lobed[i / VW];
         if (!glossy_light && !lobed) {
@@ -259,6 +283,11 @@ VINL void apply_diffuse(const es_shade_job* job, const es_shade_light* light, co
             if (shadowed) {
                 vf depth = vf_from_int(vi_gather16_at(map, place + k * VW));
                 g = vf_and(vm_le(vf_load(nearest + k * VW), depth * vf_load(cosine + k * VW)), g);
+                if (job->repair && vm_any(vm_gt(g, zero))) {
+                    const vf d[3] = {vf_load(batch->px + i) - ox, vf_load(batch->py + i) - oy, vf_load(batch->pz + i) - oz};
+                    const vf r = vf_sqrt(vf_max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], vf_set1(NEAREST2)));
+                    g = g * repaired(job, batch, i, d, r, vf_load(cosine + k * VW) / r);
+                }
             }
             vf_store(batch->e[0] + i, vf_load(batch->e[0] + i) + g * red);
             vf_store(batch->e[1] + i, vf_load(batch->e[1] + i) + g * green);
