@@ -106,6 +106,11 @@ static es_result shade(es_renderer* r, const es_frame_inputs* in)
         job.specular[k] = lamps->has_specular ? lamps->specular.at[k] : NULL;
     }
     job.lit = lamps->has_specular ? lamps->specular.lit : NULL;
+    if (s->screen_repair) {
+        job.repair = &r->screen.stack.views[0];
+        job.repair_samples = s->screen_repair;
+        job.repair_most = s->screen_radius * in->extent;
+    }
     es_arena_reset(&r->arena);
     es_vpl_visibility visibility;
     if (es_lamps_want_rays(r)) {
@@ -170,7 +175,7 @@ es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_LAMP_LIGHT);
     const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
-    const float numbers[] = {s->lamp_slope_bias, s->lamp_roughness, (float)s->lamp_interleave, in->extent, r->lamps.has_specular, (float)s->lamps};
+    const float numbers[] = {s->lamp_slope_bias, s->lamp_roughness, (float)s->lamp_interleave, in->extent, r->lamps.has_specular, (float)s->lamps, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {
         es_result result = shade(r, in);

@@ -1,5 +1,6 @@
 #include "gi/screen/passes.h"
 
+#include "gi/lamp_passes.h"
 #include "gi/screen/screen_bounce.h"
 
 void es_screen_buffers_free(es_context* context, es_screen_buffers* b)
@@ -52,9 +53,13 @@ static es_result light_views(es_renderer* r)
     es_screen_layer* layer = &b->layers[0][0];
     es_result result = reserve_light(r->context, layer, &r->gbuffer);
     if (result) return result;
+    es_compose_job lit = {0};
+    es_lamps_compose(r, &lit);
     es_screen_light_job job = {.gbuffer = &r->gbuffer, .light = layer->light};
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
+        job.lamp_irradiance[k] = lit.lamp_irradiance[k];
+    }
     es_screen_light(r->context, &job);
     b->stack.views[0].light[0] = layer->light;
     return ES_OK;
@@ -91,7 +96,8 @@ es_result es_pass_screen_bounce(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = !s->screen_bounce ? "screen.bounce is off" : s->method == ES_GI_MICRO ? "gi is micro: it bounds nothing" : !in->has_geometry ? "nothing to light" : !plan->valid[ES_PASS_DIRECT] ? plan->stats[ES_PASS_DIRECT].skipped : NULL;
+    const bool lit = plan->valid[ES_PASS_DIRECT] || plan->valid[ES_PASS_LAMP_LIGHT];
+    const char* why = !s->screen_bounce ? "screen.bounce is off" : s->method == ES_GI_MICRO ? "gi is micro: it bounds nothing" : !in->has_geometry ? "nothing to light" : !lit ? plan->stats[ES_PASS_DIRECT].skipped : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_SCREEN_BOUNCE, why);
         return ES_OK;
@@ -99,6 +105,8 @@ es_result es_pass_screen_bounce(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_SCREEN_BOUNCE);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_LIGHT);
+    es_plan_reads_pass(plan, ES_PASS_LAMP_FILTER);
     const float numbers[] = {(float)s->screen_samples, (float)s->screen_sets, s->screen_radius * in->extent, (float)s->method, es_geometry_bound(s, in), s->filter_depth, s->filter_normal};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SCREEN_BOUNCE)) return ES_OK;
