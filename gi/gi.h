@@ -56,7 +56,9 @@ enum { ES_MAX_BOUNCES = 16 };
 typedef enum es_lamps_method {
     ES_LAMPS_NONE,        /* they light nothing */
     ES_LAMPS_MAPS,        /* by a set of lights with imperfect shadow maps (Ritschel thesis §5.4.3) */
-    ES_LAMPS_TRACED       /* by the same set, a ray for each pair of light and pixel that face each other */
+    ES_LAMPS_TRACED,      /* by the same set, a ray for each pair of light and pixel that face each other */
+    ES_LAMPS_SCREEN,     /* the environment by directional occlusion in screen space (Ritschel thesis §4.2.1), glowing surfaces as with MAPS */
+    ES_LAMPS_AMBIENT      /* the environment by ambient occlusion in screen space: what directional occlusion is to beat; glowing surfaces as with MAPS */
 } es_lamps_method;
 
 /* With MICRO: nodes of the point hierarchy. */

@@ -4,6 +4,7 @@
 #include "gi/bounce_pass.h"
 #include "gi/micro_view.h"
 #include "gi/renderer.h"
+#include "gi/screen/passes.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/settings.h"
@@ -12,7 +13,7 @@
 typedef enum image_kind {
     IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
-    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
+    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
@@ -27,6 +28,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
     {IMAGE_CONFIDENCE, "confidence", "in last frame's indirect light, 0 to 1 (Knecht eq. 3.4)"},
     {IMAGE_COMPENSATION, "compensation", "of the indirect light, what traced.bias compensated finds by rays, W/(m² sr), of either sign"},
+    {IMAGE_OCCLUSION, "occlusion", "share of the environment's light that lamps screen or ambient find to be kept away, mean over channels, 0 to 1"},
     {IMAGE_SCREEN_BOUNCE, "screen-bounce", "of the indirect light, what screen.bounce finds in screen space, W/(m² sr)"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
     {IMAGE_NORMAL, "normal", "world shading normal"},
@@ -283,7 +285,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         width = height = 8; /* a black image: the frame has no such thing */
         light = NULL;
     }
-    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE;
+    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION;
     if (single) channels = 1;
     if (kind == IMAGE_MOTION) channels = 2;
     es_result result = es_image_create(context, width, height, channels, image);
@@ -309,6 +311,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }
+    case IMAGE_OCCLUSION: es_screen_occlusion_image(renderer, image->pixels); break;
     case IMAGE_CONFIDENCE: result = put_confidence(renderer, image); break;
     case IMAGE_ALBEDO: put_albedo(g, 0, image); break;
     case IMAGE_NORMAL: put_normal(g->normal, g->depth, g->stride, image); break;

@@ -51,7 +51,7 @@ bool es_lamps_are_there(const es_renderer* r) { return r->plan.valid[ES_PASS_LAM
 bool es_lamps_want_rays(const es_renderer* r) { return r->settings.lamps == ES_LAMPS_TRACED && es_lamps_are_there(r); }
 
 /* Points that micro-buffers see are lit by maps, whatever the pixels are. */
-bool es_lamps_want_maps(const es_renderer* r) { return es_lamps_are_there(r) && (r->settings.lamps == ES_LAMPS_MAPS || r->settings.method == ES_GI_MICRO); }
+bool es_lamps_want_maps(const es_renderer* r) { return es_lamps_are_there(r) && (r->settings.lamps != ES_LAMPS_TRACED || r->settings.method == ES_GI_MICRO); }
 
 es_result es_pass_lamp_maps(es_renderer* r, const es_frame_inputs* in)
 {

@@ -35,6 +35,8 @@
     X(FILTER, "filter", "pixels")                                                                                \
     X(TEMPORAL, "temporal coherence", "pixels")                                                                  \
     X(UPSAMPLE, "upsample", "pixels")                                                                            \
+    X(SCREEN_VIEWS, "screen-space views", "triangles")                                                           \
+    X(SCREEN_OCCLUSION, "screen-space occlusion", "samples")                                                     \
     X(SCREEN_BOUNCE, "screen-space bounce", "samples")                                                           \
     X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \
     X(COMPOSE, "compose", "pixels")

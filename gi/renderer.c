@@ -204,9 +204,14 @@ static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
     uint64_t moving = in->revisions.moving ? in->revisions.steps : 0;
     es_plan_reads(&r->plan, &moving, sizeof moving);
     es_plan_reads(&r->plan, &in->has_environment, sizeof in->has_environment); /* which moves as well, see es_background_job */
+    const bool layers = r->settings.screen_layers > 1;
+    es_plan_reads(&r->plan, &layers, sizeof layers);
     if (!es_plan_run(&r->plan, ES_PASS_VISIBILITY)) return ES_OK;
     es_result result = r->settings.temporal ? es_history_keep(r->context, &r->gbuffer, &r->history.gbuffer) : ES_OK;
-    if (!result) result = es_draw_gbuffer(r->rasterizer, in->list, &r->view, &r->gbuffer, &r->stats.raster);
+    es_depth_range range;
+    const es_depth_range* wanted = NULL;
+    if (!result) result = es_screen_first_layer(r, &range, &wanted);
+    if (!result) result = es_draw_gbuffer_between(r->rasterizer, in->list, &r->view, wanted, &r->gbuffer, &r->stats.raster);
     if (!result) es_plan_done(&r->plan, ES_PASS_VISIBILITY, r->stats.raster.triangles);
     return result;
 }
@@ -454,6 +459,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     const es_planes* specular = es_indirect_specular(r);
     job.lit = specular->lit;
     es_lamps_compose(r, &job);
+    es_screen_compose(r, &job);
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_BACKGROUND]) job.background[k] = r->background.at[k];
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
@@ -481,7 +487,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
-    es_plan_reads_pass(plan, ES_PASS_SCREEN_BOUNCE);
+    es_screen_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -522,6 +528,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_filter(r, in);
     if (!result && !first) result = es_pass_temporal(r, in);
     if (!result) result = es_pass_upsample(r, in);
+    if (!result) result = es_pass_screen_occlusion(r, in);
     if (!result) result = es_pass_screen_bounce(r, in);
     return result ? result : es_pass_antialias(r, picture);
 }

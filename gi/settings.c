@@ -71,7 +71,7 @@ static const es_setting renderer_table[] = {
     {"micro.rebuild", ES_SETTING_FLOAT, "1.5", 1, 1000, NULL, "how much worse than new a deforming mesh's tree of points may be before it is built anew", AT(micro_rebuild)},
     {"micro.emission", ES_SETTING_BOOL, "true", 0, 1, NULL, "glowing surfaces send light to micro-buffers; with lamps other than none they do not: their light is direct", AT(micro_emission)},
 
-    {"lamps", ES_SETTING_CHOICE, "maps", 0, 0, "none|maps|traced", "direct light of glowing surfaces and of the environment: none, of a set of lights with imperfect shadow maps, or with rays", AT(lamps)},
+    {"lamps", ES_SETTING_CHOICE, "maps", 0, 0, "none|maps|traced|screen|ambient", "direct light of glowing surfaces and of the environment: none, of a set of lights with imperfect shadow maps, or with rays; the environment's with occlusion per direction or ambient, in screen space", AT(lamps)},
     {"lamps.count", ES_SETTING_INT, "512", 1, 16384, NULL, "lights that stand for all glowing surfaces and the environment", AT(lamp_count)},
     {"lamps.size", ES_SETTING_INT, "128", 32, 256, NULL, "texels of a side of a lamp's imperfect shadow map: 32, 64, 128 or 256", AT(lamp_size)},
     {"lamps.interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern of lamps' light", AT(lamp_interleave)},

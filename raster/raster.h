@@ -176,6 +176,15 @@ ES_API void es_rasterizer_destroy(es_rasterizer* rasterizer);
 
 /* Draws everything in the list; gbuffer's size must equal the view's. Alpha masks are applied. stats may be NULL. */
 ES_API es_result es_draw_gbuffer(es_rasterizer* rasterizer, const es_draw_list* list, const es_raster_view* view, es_gbuffer* gbuffer, es_raster_stats* stats);
+/* What of a scene is drawn, pixel by pixel, by depth: rows of `stride` floats (a multiple of eight, >= width), reversed depth as es_draw_depth and `drawn` give it for
+ * the same view. Depth peeling (Everitt 2001): the next layer is what is behind the `drawn` of the one before. */
+typedef struct es_depth_range {
+    const float* behind;      /* strictly farther than this: nothing where it is 0; NULL: anything */
+    const float* before;      /* strictly nearer than this: anything where it is 0; NULL: anything */
+    float* drawn;             /* out, none of the above: 0 where nothing was; NULL: not wanted */
+    uint32_t stride;
+} es_depth_range;
+ES_API es_result es_draw_gbuffer_between(es_rasterizer* rasterizer, const es_draw_list* list, const es_raster_view* view, const es_depth_range* range, es_gbuffer* gbuffer, es_raster_stats* stats);
 /* Depth only: reversed depth in [0, 1], 0 where nothing is, rows of `stride` floats (a multiple of eight, >= width). */
 ES_API es_result es_draw_depth(es_rasterizer* rasterizer, const es_draw_list* list, const es_raster_view* view, float* depth, uint32_t stride, es_raster_stats* stats);
 

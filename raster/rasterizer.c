@@ -14,6 +14,7 @@ static void free_worker(es_context* context, es_raster_worker* w)
     es_release(context, w->key_count, sizeof *w->key_count * w->key_capacity);
     es_release(context, w->touched, sizeof *w->touched * (w->key_capacity + 1));
     es_release(context, w->tile_depth, sizeof *w->tile_depth * (ES_TILE_WORDS + 8));
+    es_release(context, w->tile_ceiling, sizeof *w->tile_ceiling * (ES_TILE_WORDS + 8));
     es_release(context, w->tile_number, sizeof *w->tile_number * (ES_TILE_FRONT + ES_TILE_WORDS + 8));
     es_release(context, w->visible, sizeof *w->visible * ES_TILE_VISIBLE_MAX);
     es_release(context, w->slot_number, sizeof *w->slot_number * ES_TILE_VISIBLE_MAX);
@@ -41,6 +42,7 @@ es_result es_rasterizer_create(es_context* context, es_rasterizer** rasterizer)
                (w->small_rects = es_allocate_array(context, ES_CHUNK_TRIANGLES, sizeof *w->small_rects)) &&
                /* eight more: a row that begins in the last column of the last row ends beyond it */
                (w->tile_depth = es_allocate_array(context, ES_TILE_WORDS + 8, sizeof *w->tile_depth)) &&
+               (w->tile_ceiling = es_allocate_array(context, ES_TILE_WORDS + 8, sizeof *w->tile_ceiling)) &&
                (w->tile_number = es_allocate_zero(context, sizeof *w->tile_number * (ES_TILE_FRONT + ES_TILE_WORDS + 8))) &&
                (w->visible = es_allocate_zero(context, sizeof *w->visible * ES_TILE_VISIBLE_MAX)) &&
                (w->slot_number = es_allocate_array(context, ES_TILE_VISIBLE_MAX, sizeof *w->slot_number)) &&
@@ -80,6 +82,7 @@ typedef struct draw {
     es_rasterizer* rasterizer;
     const es_raster_view* view;
     es_resolve_job resolve;   /* G-buffer views */
+    const es_depth_range* range; /* NULL: all */
     float* depth;             /* depth-only views */
     uint32_t stride;
 } draw;
@@ -142,6 +145,24 @@ static void copy_depth(const draw* d, const es_tile* tile, es_raster_worker* w)
     }
 }
 
+/* A plane's part over a tile, and back: nothing lies past the view's last row and column. */
+static void tile_from_plane(const es_tile* tile, const float* plane, uint32_t stride, float* to)
+{
+    const uint32_t columns = tile->width - (uint32_t)tile->x < ES_TILE_SIZE ? tile->width - (uint32_t)tile->x : ES_TILE_SIZE;
+    const uint32_t rows = tile->height - (uint32_t)tile->y < ES_TILE_SIZE ? tile->height - (uint32_t)tile->y : ES_TILE_SIZE;
+    memset(to, 0, ES_TILE_WORDS * sizeof *to);
+    for (uint32_t y = 0; y < rows; y++) memcpy(to + y * ES_TILE_PITCH, plane + ((size_t)tile->y + y) * stride + (uint32_t)tile->x, columns * sizeof *to);
+}
+static void drawn_from_tile(const es_tile* tile, const es_depth_range* range)
+{
+    const uint32_t columns = tile->width - (uint32_t)tile->x < ES_TILE_SIZE ? tile->width - (uint32_t)tile->x : ES_TILE_SIZE;
+    const uint32_t rows = tile->height - (uint32_t)tile->y < ES_TILE_SIZE ? tile->height - (uint32_t)tile->y : ES_TILE_SIZE;
+    for (uint32_t y = 0; y < rows; y++) {
+        float* to = range->drawn + ((size_t)tile->y + y) * range->stride + (uint32_t)tile->x;
+        for (uint32_t x = 0; x < columns; x++) to[x] = tile->number[y * ES_TILE_PITCH + x] ? tile->depth[y * ES_TILE_PITCH + x] : 0.0f;
+    }
+}
+
 static void draw_tiles(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const draw* d = user;
@@ -151,7 +172,12 @@ static void draw_tiles(void* user, uint32_t begin, uint32_t end, uint32_t worker
         es_tile tile = {.depth = w->tile_depth, .number = d->depth ? NULL : w->tile_number + ES_TILE_FRONT, .triangle_ids = w->triangle_ids, .next_number = 1, .block_minimum = w->block_minimum,
             .x = (int32_t)(t % r->tiles_x) * ES_TILE_SIZE, .y = (int32_t)(t / r->tiles_x) * ES_TILE_SIZE, .width = d->view->width, .height = d->view->height,
             .chunks = r->chunks, .instances = r->instances};
-        memset(tile.depth, 0, ES_TILE_WORDS * sizeof *tile.depth);
+        if (d->range && d->range->before) tile_from_plane(&tile, d->range->before, d->range->stride, tile.depth);
+        else memset(tile.depth, 0, ES_TILE_WORDS * sizeof *tile.depth);
+        if (d->range && d->range->behind) {
+            tile_from_plane(&tile, d->range->behind, d->range->stride, w->tile_ceiling);
+            tile.ceiling = w->tile_ceiling;
+        }
         if (tile.number) memset(tile.number, 0, ES_TILE_WORDS * sizeof *tile.number);
         memset(w->block_minimum, 0, sizeof w->block_minimum);
         const uint32_t* first = r->key_first + (size_t)t * ES_RECORD_KINDS;
@@ -167,6 +193,7 @@ static void draw_tiles(void* user, uint32_t begin, uint32_t end, uint32_t worker
             job.slot = w->slot;
             job.slot_number = w->slot_number;
             job.slot_pixel = w->slot_pixel;
+            if (d->range && d->range->drawn) drawn_from_tile(&tile, d->range);
             r->kernels->resolve_tile(&job, &tile);
             w->pixels += job.pixels;
         }
@@ -280,6 +307,11 @@ static bool run_stages(draw* d, const es_draw_list* list, uint32_t planes, es_ra
 
 es_result es_draw_gbuffer(es_rasterizer* rasterizer, const es_draw_list* list, const es_raster_view* view, es_gbuffer* gbuffer, es_raster_stats* stats)
 {
+    return es_draw_gbuffer_between(rasterizer, list, view, NULL, gbuffer, stats);
+}
+
+es_result es_draw_gbuffer_between(es_rasterizer* rasterizer, const es_draw_list* list, const es_raster_view* view, const es_depth_range* range, es_gbuffer* gbuffer, es_raster_stats* stats)
+{
     es_context* context = rasterizer->context;
     es_result result = check(context, list, view);
     if (result != ES_OK) return result;
@@ -287,8 +319,10 @@ es_result es_draw_gbuffer(es_rasterizer* rasterizer, const es_draw_list* list, c
         return es_misuse(context, ES_INVALID_ARGUMENT, "a view of %u x %u pixels cannot be drawn into a G-buffer of %u x %u; the sizes must be equal", view->width,
             view->height, gbuffer->width, gbuffer->height);
     if (!gbuffer->planes || !gbuffer->memory) return es_misuse(context, ES_INVALID_ARGUMENT, "the G-buffer has no planes; create it with es_gbuffer_create");
+    if (range && (range->stride < view->width || range->stride % 8))
+        return es_misuse(context, ES_INVALID_ARGUMENT, "depth rows of %u floats for a view %u pixels wide; a multiple of 8, at least the width, is accepted", range->stride, view->width);
     es_fp_environment environment = es_fp_enter();
-    draw d = {.rasterizer = rasterizer, .view = view, .resolve.gbuffer = *gbuffer};
+    draw d = {.rasterizer = rasterizer, .view = view, .range = range, .resolve.gbuffer = *gbuffer};
     bool drawn = run_stages(&d, list, gbuffer->planes, stats);
     es_fp_leave(environment);
     return drawn ? ES_OK : es_context_last_result(context);

@@ -13,7 +13,7 @@ typedef struct es_raster_worker {
     uint32_t* key_count;            /* per (tile, kind), zero between chunks */
     uint32_t* touched;              /* keys whose count is not zero */
     size_t key_capacity;
-    float* tile_depth;
+    float *tile_depth, *tile_ceiling;
     uint32_t* tile_number;
     es_visible_triangle* visible;
     uint32_t *slot_number, *slot_pixel;

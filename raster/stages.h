@@ -114,6 +114,7 @@ typedef struct es_tile {
     uint32_t* number;                   /* NULL: depth only; otherwise ES_TILE_FRONT words before it can be read */
     uint32_t* triangle_ids;             /* by number; eight words more than there are records */
     uint32_t next_number;
+    const float* ceiling;               /* NULL: none; otherwise ES_TILE_WORDS: what is not strictly farther is not drawn */
     float* block_minimum;               /* of the 8x8 blocks' depth, or less: 64 */
     int32_t x, y;                       /* pixel of the tile's first column and row */
     uint32_t width, height;             /* of the view */

@@ -192,3 +192,19 @@ void ES_KERNEL(es_gi_screen_reflect)(const es_screen_reflect_job* job, uint32_t 
             for (int k = 0; k < 3; k++) vf_store(job->radiance[k] + at, share[k] * vf_load(job->irradiance[k] + at));
         }
 }
+
+/* Both normals of what is seen, the other way round. */
+void ES_KERNEL(es_gi_turn_normals)(const es_gbuffer* g, uint32_t row_begin, uint32_t row_end)
+{
+    for (uint32_t y = row_begin; y < row_end; y++)
+        for (uint32_t x = 0; x < g->width; x += VW) {
+            const size_t at = (size_t)y * g->stride + x;
+            uint32_t* const planes[2] = {g->normal + at, g->geometric_normal + at};
+            const vm seen = vm_gt(vf_load(g->depth + at), vf_zero());
+            for (int i = 0; i < 2; i++) {
+                vf n[3];
+                es_unpack_normal_v(vi_load(planes[i]), &n[0], &n[1], &n[2]);
+                vi_store(planes[i], seen & es_pack_normal_v(vf_neg(n[0]), vf_neg(n[1]), vf_neg(n[2])));
+            }
+        }
+}

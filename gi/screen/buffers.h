@@ -15,7 +15,14 @@ typedef struct es_screen_layer {
 
 typedef struct es_screen_buffers {
     es_screen_layer layers[ES_SCREEN_MAX_VIEWS][ES_SCREEN_MAX_LAYERS];
+    es_raster_view cameras[ES_SCREEN_MAX_VIEWS];
+    float* drawn[ES_SCREEN_MAX_LAYERS - 1]; /* reversed depth of the camera's layers that there are more behind: rows of its stride; NULL: there is one layer */
+    size_t drawn_floats;
     es_view_stack stack;           /* of this frame */
+    es_planes share, filtered_share; /* of the environment's light that arrives, each channel; ambient: the first alone */
+    bool directional;              /* they hold three */
+    es_planes arriving, reflected; /* light of lamps with it: irradiance, radiance of lobes */
+    bool has_specular;
     es_planes irradiance, bounce;  /* that neighbours send: as it is found, filtered; the latter is reflected */
 } es_screen_buffers;
 

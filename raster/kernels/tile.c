@@ -8,10 +8,11 @@
 #include "raster/kernels/texture_sampling.h"
 #include "platform/simd.h"
 
-/* Eight pixels from `at` on; there are no numbers unless `numbered`. Returns the depth left there. */
-VINL vf put(float* depth, uint32_t* numbers, uint32_t at, vm covered, vf z, vi number, bool numbered)
+/* Eight pixels from `at` on; there are no numbers unless `numbered`, and there is no `ceiling` unless `peeled`, with numbers. Returns the depth left there. */
+VINL vf put(float* depth, uint32_t* numbers, const float* ceiling, uint32_t at, vm covered, vf z, vi number, bool numbered, bool peeled)
 {
     depth += at;
+    if (peeled) covered = covered & vm_lt(z, vf_load(ceiling + at));
     vf old = vf_load(depth);
     if (!numbered) {
         vf left = vf_max(vf_and(covered, z), old);
@@ -73,10 +74,11 @@ VINL vi set_up_small(const es_tile* tile, const es_small_triangle* records, vi r
     return id;
 }
 
-VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered)
+VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered, bool peeled)
 {
     const es_small_triangle* records = segment->records;
     float* const depth = tile->depth;
+    const float* const ceiling = tile->ceiling;
     uint32_t* const numbers = tile->number;
     uint32_t next_number = tile->next_number;
     vi iota = vi_iota();
@@ -100,7 +102,7 @@ VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered)
                 vf d = z;
                 uint32_t at = start;
                 for (int32_t row = s.rows[t]; row > 0; row--) {
-                    put(depth, numbers, at, vi_gt(f0 | f1 | f2, vi_set1(-1)), vf_clamp(d, low, high), number, numbered);
+                    put(depth, numbers, ceiling, at, vi_gt(f0 | f1 | f2, vi_set1(-1)), vf_clamp(d, low, high), number, numbered, peeled);
                     f0 += b0;
                     f1 += b1;
                     f2 += b2;
@@ -122,8 +124,9 @@ VINL void draw_small(es_tile* tile, const es_segment* segment, bool numbered)
 
 void ES_KERNEL(es_draw_small)(es_tile* tile, const es_segment* segment)
 {
-    if (tile->number) draw_small(tile, segment, true);
-    else draw_small(tile, segment, false);
+    if (tile->ceiling) draw_small(tile, segment, true, true);
+    else if (tile->number) draw_small(tile, segment, true, false);
+    else draw_small(tile, segment, false, false);
 }
 
 /* ---- large ---------------------------------------------------------------------------------------------------------------------- */
@@ -241,7 +244,7 @@ static vm alpha_passes(const es_tile* tile, const masked_setup* s, int32_t colum
     return active & ~vm_lt(alpha, vf_set1(s->material->alpha_cutoff));
 }
 
-VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* mask, bool numbered)
+VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* mask, bool numbered, bool peeled)
 {
     vi iota = vi_iota(), zero = vi_zero();
     vi a0 = vi_set1(s->a[0]), a1 = vi_set1(s->a[1]), a2 = vi_set1(s->a[2]), b0 = vi_set1(s->b[0]), b1 = vi_set1(s->b[1]), b2 = vi_set1(s->b[2]);
@@ -260,6 +263,7 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* m
     float margin = 2e-6f * ((s->z < 0 ? -s->z : s->z) + 64.0f * (steep_x + steep_y));
     vf z_top = vf_set1((s->zx > 0 ? 7 * s->zx : 0) + (s->zy > 0 ? 7 * s->zy : 0) + margin);
     float* const depth = tile->depth;
+    const float* const ceiling = tile->ceiling;
     uint32_t* const numbers = tile->number;
     vi number = vi_set1((int32_t)tile->next_number);
     bool any = false;
@@ -287,7 +291,7 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* m
             vf least = vf_set1(2.0f);
             if (!mask && (inside_bits >> bx & 1)) {
                 for (int row = 0; row < 8; row++, at += ES_TILE_PITCH) {
-                    least = vf_min(least, put(depth, numbers, at, vm_all_lanes(), vf_clamp(z, low, high), number, numbered));
+                    least = vf_min(least, put(depth, numbers, ceiling, at, vm_all_lanes(), vf_clamp(z, low, high), number, numbered, peeled));
                     z += zy;
                 }
             } else {
@@ -299,7 +303,7 @@ VINL bool draw_blocks(es_tile* tile, const large_setup* s, const masked_setup* m
                         covered &= vm_gt(d, vf_load(depth + at));
                         if (vm_any(covered)) covered = alpha_passes(tile, mask, 8 * bx, 8 * by + row, covered);
                     }
-                    least = vf_min(least, put(depth, numbers, at, covered, d, number, numbered));
+                    least = vf_min(least, put(depth, numbers, ceiling, at, covered, d, number, numbered, peeled));
                     f0 += b0;
                     f1 += b1;
                     f2 += b2;
@@ -324,7 +328,7 @@ void ES_KERNEL(es_draw_large)(es_tile* tile, const es_segment* segment)
         const es_large_triangle* r = &records[segment->list[i]];
         large_setup s = set_up_large(tile, r);
         if (tile->number) tile->triangle_ids[tile->next_number] = r->id;
-        bool any = tile->number ? draw_blocks(tile, &s, NULL, true) : draw_blocks(tile, &s, NULL, false);
+        bool any = tile->ceiling ? draw_blocks(tile, &s, NULL, true, true) : tile->number ? draw_blocks(tile, &s, NULL, true, false) : draw_blocks(tile, &s, NULL, false, false);
         tile->next_number++;
         tile->hidden += !any;
     }
@@ -338,7 +342,7 @@ void ES_KERNEL(es_draw_masked)(es_tile* tile, const es_segment* segment)
         large_setup s = set_up_large(tile, r);
         masked_setup mask = set_up_masked(tile, r->id);
         if (tile->number) tile->triangle_ids[tile->next_number] = r->id;
-        bool any = tile->number ? draw_blocks(tile, &s, &mask, true) : draw_blocks(tile, &s, &mask, false);
+        bool any = tile->ceiling ? draw_blocks(tile, &s, &mask, true, true) : tile->number ? draw_blocks(tile, &s, &mask, true, false) : draw_blocks(tile, &s, &mask, false, false);
         tile->next_number++;
         tile->hidden += !any;
     }
