@@ -156,6 +156,9 @@ size_t bench_bounces_rows(bench_row* rows, size_t capacity);
 /* bench_micro.c */
 int bench_micro(const bench_options* options);
 size_t bench_micro_rows(bench_row* rows, size_t capacity);
+/* bench_lamps.c */
+int bench_lamps(const bench_options* options);
+size_t bench_lamps_rows(bench_row* rows, size_t capacity);
 /* bench_ledger.c */
 int bench_ledger(const bench_options* options);
 /* The figures' common ground: 1024 × 768, 1024 lights of 128² texels and 8192 points, 8 × 8, nothing skipped. */

@@ -183,7 +183,8 @@ bool micro_measure(micro_bench* bench, const micro_stage* stage, const char* tex
     settings.width = bench->width;
     settings.height = bench->height;
     settings.skip = false;
-    settings.micro_emission = false; /* nor has the truth the light of what glows */
+    settings.lamps = ES_LAMPS_NONE; /* nor has the truth the light of what glows */
+    settings.micro_emission = false;
     if (!error_apply(bench->context, &setting, &settings)) return false;
     bool works = es_renderer_create(bench->context, &settings, &renderer) == ES_OK;
     const double begun = demo_seconds();

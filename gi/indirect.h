@@ -31,7 +31,7 @@ void es_indirect_reads(es_plan* plan);
 const char* es_indirect_nothing(const es_renderer* renderer, const es_frame_inputs* in);
 /* At half the resolution? */
 bool es_indirect_is_halved(const es_renderer_settings* settings);
-/* May a surface of the frame have a lobe? Or a virtual point light? */
+/* May a surface of the frame have a lobe worth evaluating? Or a virtual point light? */
 bool es_surfaces_have_lobes(const es_draw_list* list);
 bool es_frame_has_lobes(const es_renderer* renderer, const es_draw_list* list);
 

@@ -86,6 +86,10 @@ es_shade_job es_lamps_at_points(const es_renderer* r)
         .slope_bias = s->lamp_slope_bias * r->frame.extent, .spread = LAMP_SPREAD, .geometry_bound = ES_UNBOUNDED, .lobe_roughness = s->lamp_roughness, .interleave = 1};
 }
 
+/* The environment's light may be found in screen space (gi/screen/passes.h): its lights then make a bounce, and light no pixels. */
+static bool sky_in_screen_space(const es_renderer* r) { return r->settings.lamps == ES_LAMPS_SCREEN || r->settings.lamps == ES_LAMPS_AMBIENT; }
+static uint32_t shaded_count(const es_renderer* r) { return sky_in_screen_space(r) ? r->lamps.set.glowing : r->lamps.set.shaded_count; }
+
 static es_result shade(es_renderer* r, const es_frame_inputs* in)
 {
     const es_renderer_settings* s = &r->settings;
@@ -99,7 +103,7 @@ static es_result shade(es_renderer* r, const es_frame_inputs* in)
     job.interleave = s->lamp_interleave;
     job.seed = s->seed;
     job.vpls = lamps->set.shaded;
-    job.vpl_count = lamps->set.shaded_count;
+    job.vpl_count = shaded_count(r);
     job.map_of = lamps->set.map_of;
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = lamps->irradiance.at[k];
@@ -161,17 +165,29 @@ static es_result pass_filter(es_renderer* r, const char* nothing)
     return result;
 }
 
+/* Direct light is that of the surface model, so a lobe counts however wide it is: its Fresnel term takes what it reflects from the diffuse part,
+ * a quarter where a floor is seen at a slant. */
+static bool anything_specular(const es_draw_list* list)
+{
+    for (uint32_t i = 0; i < list->instance_count; i++) {
+        const es_material_desc* m = &list->materials[list->instances[i].material];
+        if (m->model != ES_SURFACE_UNLIT && (m->specular > 0.0f || m->metallic > 0.0f)) return true;
+    }
+    return false;
+}
+
 es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const char* why = no_light(r, in);
+    if (!why && !shaded_count(r)) why = "the environment's light is found in screen space";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_LAMP_LIGHT, why);
         es_lamps_free_planes(r->context, &r->lamps);
         return pass_filter(r, why);
     }
-    r->lamps.has_specular = es_surfaces_have_lobes(in->list);
+    r->lamps.has_specular = anything_specular(in->list);
     es_plan_begin(plan, ES_PASS_LAMP_LIGHT);
     const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
@@ -180,7 +196,7 @@ es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
     if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {
         es_result result = shade(r, in);
         if (result) return result;
-        es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * r->lamps.set.shaded_count / (s->lamp_interleave * s->lamp_interleave));
+        es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * shaded_count(r) / (s->lamp_interleave * s->lamp_interleave));
     }
     return pass_filter(r, NULL);
 }

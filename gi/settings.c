@@ -77,7 +77,7 @@ static const es_setting renderer_table[] = {
     {"lamps.interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern of lamps' light", AT(lamp_interleave)},
     {"lamps.vpls", ES_SETTING_INT, "256", 0, 16384, NULL, "virtual point lights of the first bounce of lamps' light", AT(lamp_vpls)},
     {"lamps.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "lobes sharper than this are widened to it, or each of a lamp's lights would show as a spot", AT(lamp_roughness)},
-    {"lamps.slope-bias", ES_SETTING_FLOAT, "0.026", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(lamp_slope_bias)},
+    {"lamps.slope-bias", ES_SETTING_FLOAT, "0.016", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(lamp_slope_bias)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
     {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent; n is interleave, with gi micro micro.filter", AT(filter_passes)},

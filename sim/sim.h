@@ -246,6 +246,33 @@ ES_API es_result es_world_add_light(es_world* world, const es_light_desc* desc, 
 ES_API es_result es_world_set_light(es_world* world, es_light light, const es_light_desc* desc);
 ES_API es_result es_world_get_light(const es_world* world, es_light light, es_light_desc* desc);
 
+/* ---- area lights: things that glow ------------------------------------------------------------------------------------------------------------ */
+
+typedef enum es_area_shape { ES_AREA_RECTANGLE, ES_AREA_DISC, ES_AREA_SPHERE } es_area_shape;
+
+/* Flat ones lie in the node's xy plane about its origin and send along its -z, as other lights do. */
+typedef struct es_area_light_desc {
+    const char* name;
+    es_node node;
+    es_area_shape shape;
+    float size[2];            /* width along x and height along y, or diameters; of a sphere the first alone. Metres where the node is not scaled */
+    float color[3];           /* linear, times what follows */
+    float radiance;           /* W/(m² sr) … */
+    float flux;               /* … or, where that is 0, W that it sends in all, with a white texture and in a node that is not scaled */
+    bool two_sided;           /* flat: sends along +z as well */
+    es_texture_use texture;   /* by which the colour is multiplied: (0, 0) at a flat one's upper left as seen from where it shines; a sphere's as on a globe */
+} es_area_light_desc;
+ES_API es_area_light_desc es_default_area_light_desc(void); /* a white rectangle of 1 m × 1 m, 10 W/(m² sr) */
+
+/* What an area light is: an instance of a mesh whose material glows, black otherwise. It is seen, traced and lit by as any such thing, and found,
+ * moved, hidden, saved, changed (es_world_set_material, es_world_set_instance) as one. */
+typedef struct es_area_light { es_mesh mesh; es_material material; es_instance instance; } es_area_light;
+/* Triangles' area is that of the round shape, so that it sends what it should. INVALID_ARGUMENT when a number is negative or not finite, or the size is none;
+ * nothing is added then. */
+ES_API es_result es_world_add_area_light(es_world* world, const es_area_light_desc* desc, es_area_light* light);
+/* All three. */
+ES_API es_result es_world_destroy_area_light(es_world* world, const es_area_light* light);
+
 /* ---- environment: light from everywhere, infinitely far away --------------------------------------------------------------------------------- */
 
 /* A world has at most one. It lights the reference's paths; where nothing else is, it is what is seen by them and by the real-time methods. */

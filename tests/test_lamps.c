@@ -27,6 +27,7 @@ static es_renderer_settings settings_of(uint32_t lamps)
     s.lamp_interleave = 1;
     s.ism_points = 1024;
     s.ism_pool = 16384;
+    s.lamp_slope_bias = 0.026f; /* of so few points */
     return s;
 }
 
@@ -173,6 +174,47 @@ static void test_form_factors(void** state)
     glowing.double_sided = false;
     add_rectangle(&w, es_v3(-0.4f, 0.8f, 0.25f), es_v3(0.8f, 0, 0), es_v3(0, 0, -0.5f), &glowing);
     check_floor(&w, of_rectangle, 0, 0, "dark side of a rectangle");
+    small_world_destroy(&w);
+}
+
+/* The same shapes as es_world_add_area_light makes them, by radiance or by what they send in all. */
+static void test_area_lights(void** state)
+{
+    (void)state;
+    static const struct { es_area_shape shape; float size[2], height; double area; form_factor factor; const char* name; } shapes[] = {
+        {ES_AREA_RECTANGLE, {0.8f, 0.5f}, 0.8f, 0.4, of_rectangle, "rectangle"}, {ES_AREA_DISC, {0.9f, 0.9f}, 0.7f, 0.6361725, of_disc, "disc"}, {ES_AREA_SPHERE, {0.6f, 0}, 0.9f, 1.1309734, of_sphere, "sphere"}};
+    for (size_t i = 0; i < 3; i++)
+        for (int by_flux = 0; by_flux < 2; by_flux++) {
+            small_world w = small_world_create();
+            add_floor(&w);
+            es_area_light_desc desc = es_default_area_light_desc();
+            desc.shape = shapes[i].shape;
+            memcpy(desc.size, shapes[i].size, sizeof desc.size);
+            desc.radiance = by_flux ? 0 : radiance;
+            desc.flux = by_flux ? (float)(pi * shapes[i].area * (double)radiance) : 0;
+            desc.node = node_towards(&w, es_v3(0, shapes[i].height, 0), es_v3(0, -1, 0));
+            es_area_light light;
+            assert_int_equal(es_world_add_area_light(w.world, &desc, &light), ES_OK);
+            check_floor(&w, shapes[i].factor, 1, 0.03, shapes[i].name);
+            if (by_flux) {
+                assert_int_equal(es_world_destroy_area_light(w.world, &light), ES_OK);
+                check_floor(&w, shapes[i].factor, 0, 0, "no light");
+                assert_int_not_equal(es_world_destroy_area_light(w.world, &light), ES_OK);
+            }
+            small_world_destroy(&w);
+        }
+    small_world w = small_world_create();
+    es_area_light_desc bad = es_default_area_light_desc();
+    es_area_light light;
+    bad.size[1] = 0;
+    assert_int_equal(es_world_add_area_light(w.world, &bad, &light), ES_INVALID_ARGUMENT);
+    bad = es_default_area_light_desc();
+    bad.radiance = NAN;
+    assert_int_equal(es_world_add_area_light(w.world, &bad, &light), ES_INVALID_ARGUMENT);
+    bad = es_default_area_light_desc();
+    bad.node.id = 12345;
+    assert_int_not_equal(es_world_add_area_light(w.world, &bad, &light), ES_OK);
+    assert_int_equal(es_world_draw_list(w.world)->instance_count, 0);
     small_world_destroy(&w);
 }
 
@@ -448,6 +490,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_form_factors),
+        cmocka_unit_test(test_area_lights),
         cmocka_unit_test(test_places),
         cmocka_unit_test(test_moving_lamp),
         cmocka_unit_test(test_nothing_glows),
