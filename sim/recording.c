@@ -213,6 +213,7 @@ static void visit_input(state_io* io, es_input* in)
         visit_u32(io, &in->vertex);
         visit_vector(io, &in->a);
         break;
+    case ES_INPUT_SKY: es_visit_sky_desc(io, &in->sky); break;
     case ES_INPUT_GRAB_SOFT:
         visit_u32(io, &in->other);
         visit_u32(io, &in->vertex);
@@ -300,6 +301,7 @@ static es_result apply(es_world* world, const es_input* in)
     case ES_INPUT_SOFT_ATTACH: return es_world_soft_attach(world, (es_soft){in->id}, &in->attachment);
     case ES_INPUT_SOFT_DETACH: return es_world_soft_detach(world, (es_soft){in->id}, in->vertex);
     case ES_INPUT_SOFT_TEAR: return es_world_soft_tear(world, (es_soft){in->id}, in->place, in->number);
+    case ES_INPUT_SKY: return es_world_set_sky(world, &in->sky);
     case ES_INPUT_SOFT_IMPULSE: return es_world_soft_impulse(world, (es_soft){in->id}, in->vertex, in->a);
     case ES_INPUT_SOFT_WAKE: return es_world_wake_soft(world, (es_soft){in->id});
     case ES_INPUT_GRAB_SOFT: return es_world_grab_soft(world, in->id, (es_soft){in->other}, in->vertex, in->place);

@@ -35,6 +35,7 @@ typedef enum es_input_type {
     ES_INPUT_SOFT_IMPULSE,
     ES_INPUT_SOFT_WAKE,
     ES_INPUT_GRAB_SOFT,
+    ES_INPUT_SKY,
     ES_INPUT_TYPES
 } es_input_type;
 
@@ -59,6 +60,7 @@ typedef struct es_input {
         es_quat rotation;
         es_soft_desc soft;    /* its numbers */
         es_soft_attachment attachment;
+        es_sky_desc sky;
         struct { const void* bytes; size_t size; } state;
     };
 } es_input;

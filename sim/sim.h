@@ -295,6 +295,39 @@ ES_API es_result es_world_load_environment(es_world* world, const char* path, co
 /* False when there is none. The image is the world's own copy and valid until the next call that changes the world. */
 ES_API bool es_world_get_environment(const es_world* world, es_environment_desc* desc);
 
+/* ---- sky: sun and clear sky of a date and a place --------------------------------------------------------------------------------- */
+
+/* The environment becomes the clear sky (Preetham et al. 1999) over a diffuse ground, and a directional light the sun, at a moment that goes on with the world's
+ * time; both in W of visible light: at noon the sun has some 600 W/m² and the sky some tens of W/(m² sr), so that pictures want an exposure of about -6.
+ * At night there is starlight only. The sun's disc is in the light, not in the environment.
+ * The light moves with every step; the picture of the sky is drawn anew when the sun has moved by half a degree (pictures exist for every half degree of elevation
+ * and azimuth, and the nearest is shown, so that they do not depend on how the moment was come by). */
+typedef struct es_sky_desc {
+    int32_t year, month, day; /* Gregorian, 1 … 9999; within 0.1 degrees for this and the last century */
+    double seconds;           /* of universal time since that day's midnight, at the world's time now; may be negative or more than a day, up to 1e10 */
+    float speed;              /* seconds of the sky per second of the world, 0 … 1e6 */
+    float latitude, longitude; /* radians, north and east positive */
+    float north;              /* where north is: -z turned by so much about +y, counter-clockwise seen from above, radians */
+    float turbidity;          /* haze, 2 (clear) … 10 */
+    float intensity;          /* factor of sky and sun, 0 … 1e6 */
+    float ground_albedo[3];   /* 0 … 1 */
+    es_light sun;             /* a directional light with a node, whose rotation, colour and intensity the sky sets; null: no sun */
+} es_sky_desc;
+/* Noon of the 21st of June 2024 where both coordinates are 0, at the world's own speed. */
+ES_API es_sky_desc es_default_sky_desc(void);
+/* NULL: none, and no environment. Takes the place of the environment; es_world_set_environment ends it. Its numbers are part of the saved state; that there is one is
+ * content. INVALID_ARGUMENT when something is out of its range. */
+ES_API es_result es_world_set_sky(es_world* world, const es_sky_desc* desc);
+/* False when there is none. Its seconds are those of now. */
+ES_API bool es_world_get_sky(const es_world* world, es_sky_desc* desc);
+typedef struct es_sun {
+    es_vec3 direction;        /* unit, towards its middle */
+    float elevation, azimuth; /* radians, without refraction; from north to east */
+    float irradiance[3];      /* W/m² on what faces it; 0 below the horizon */
+} es_sun;
+/* All zero when there is no sky. */
+ES_API es_sun es_world_sun(const es_world* world);
+
 /* ---- clips ------------------------------------------------------------------------------------------------------------------------------------ */
 
 typedef enum es_clip_path {

@@ -231,9 +231,10 @@ static void visit_environment(es_world* world, state_io* io)
     memcpy(radiance, world->environment_radiance, sizeof radiance);
     visit_floats(io, radiance, 3);
     visit_floats(io, &rotation, 1);
+    es_visit_sky(world, io);
     if (!reading(io) || !io->good) return;
     io->good = es_environment_numbers_valid(radiance, rotation);
-    if (!io->good || io->mode != APPLY) return;
+    if (!io->good || io->mode != APPLY || world->sky.on) return;
     const es_image* image = world->environment_image.pixels ? &world->environment_image : NULL;
     es_world_set_environment(world, &(es_environment_desc){.image = image, .radiance = {radiance[0], radiance[1], radiance[2]}, .rotation = rotation});
 }
@@ -321,6 +322,7 @@ static uint64_t content_signature(const es_world* world)
         hash = es_hash_bytes(hash, &kind, sizeof kind);
     }
     uint32_t environment[2] = {world->environment_image.width, world->environment_image.height};
+    if (world->sky.on) hash++;
     return es_hash_bytes(hash, environment, sizeof environment);
 }
 
@@ -366,6 +368,7 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     es_recording* recording = es_recording_pause(world); /* it is one input, not those it is made of */
     es_fp_environment environment = es_fp_enter();
     visit_world(world, &io);
+    if (io.good) es_sky_refresh(world);
     es_fp_leave(environment);
     world->revisions.steps += 2;
     es_world_refresh(world);

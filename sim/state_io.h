@@ -51,6 +51,10 @@ static inline void visit_flag(state_io* io, bool* flag)
     *flag = word == 1;
 }
 
+/* sim/sky.c */
+void es_visit_sky(es_world* world, state_io* io);
+void es_visit_sky_desc(state_io* io, es_sky_desc* desc);
+
 /* sim/movers.c: a desc as a mover keeps it, its axis and rotation of unit length */
 bool es_mover_is_resolved(const es_mover_desc* desc);
 void es_mover_put(es_world* world, es_mover_object* mover, const es_mover_desc* resolved);

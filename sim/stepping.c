@@ -74,6 +74,7 @@ es_result es_world_step(es_world* world, float dt)
         es_fp_environment environment = es_fp_enter();
         result = advance(world);
         pose_at(world, world->time);
+        es_sky_refresh(world);
         es_clips_retire(world);
         es_nodes_refresh(world); /* what bodies' nodes are below */
         es_rigid_pose(world, es_step_phase(world));

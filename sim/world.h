@@ -117,6 +117,14 @@ typedef struct es_clip_object {
 /* What a camera revision stands for. No padding: compared as bytes. */
 typedef struct es_camera_state { uint32_t id, orthographic; float fov_y, half_height, near_plane, far_plane; es_mat4 world; } es_camera_state;
 
+typedef struct es_sky {
+    bool on;
+    es_sky_desc desc;
+    double since;            /* the world's time at which desc's moment was */
+    bool drawn;              /* the environment's picture is that of this: */
+    int32_t drawn_step;      /* elevation / ES_SKY_STEP */
+} es_sky;
+
 struct es_world {
     es_context* context;
     es_world_settings settings;
@@ -157,6 +165,8 @@ struct es_world {
 
     es_image environment_image;    /* three channels; no pixels: the same radiance everywhere */
     float environment_radiance[3], environment_rotation;
+
+    es_sky sky;
 
     es_camera_state camera_state;
     bool camera_dirty, camera_moving;
@@ -250,6 +260,8 @@ bool es_camera_desc_resolve(es_world* world, const es_camera_desc* desc, es_came
 /* Of a saved state: does it hold what es_world_set_environment would take? */
 bool es_environment_numbers_valid(const float radiance[3], float rotation);
 void es_environment_free(es_world* world);
+/* Brings environment and sun to where they are at the world's time. */
+void es_sky_refresh(es_world* world);
 bool es_light_desc_resolve(es_world* world, const es_light_desc* desc, es_light_desc* resolved);
 
 /* Where bodies and cloth stand, seconds. */

@@ -16,6 +16,7 @@ static const es_scene scenes[] = {
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
     {"hall", "a colonnade lit from its side aisle, for the most part by what the walls give back (108,516 triangles)", es_scene_hall},
     {"cornell-stack", "a stack of cubes in a Cornell box, a ball that brings it down, a lamp that sways (3,372 triangles)", es_scene_cornell_stack, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
+    {"courtyard", "a court with arcades under sun and sky; a day takes forty seconds", es_scene_courtyard, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "exposure=-5.5", "shadow.size=1024")},
     {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature, SETTINGS(STEADY, "vpl.count=512", "ism.points=2048", "vpl.light-size=64", "shadow.size=192", "shadow.filter=3", "exposure=0.9")},
     {"curtain", "a curtain in a doorway opens and closes the light of a room", es_scene_curtain, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "vpl.bound=40", "exposure=0.7")},
     {"gallery", "a museum's hall of glossy and diffuse things about a turning dragon (626,304 triangles)", es_scene_gallery, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "micro.points=1048576", "micro.spacing=4")},

@@ -23,6 +23,7 @@ es_result es_scene_curtain(es_world* world, uint32_t triangles);
 es_result es_scene_creature(es_world* world, uint32_t triangles);
 es_result es_scene_lantern_walk(es_world* world, uint32_t triangles);
 es_result es_scene_maze(es_world* world, uint32_t triangles);
+es_result es_scene_courtyard(es_world* world, uint32_t triangles);
 es_result es_scene_gallery(es_world* world, uint32_t triangles);
 
 #endif
