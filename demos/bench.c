@@ -41,6 +41,7 @@ static const benchmark benchmarks[] = {
     {"bounces", bench_bounces, bench_bounces_rows, false},
     {"micro", bench_micro, bench_micro_rows, false},
     {"lamps", bench_lamps, bench_lamps_rows, false},
+    {"screen", bench_screen, bench_screen_rows, false},
     {"scale", bench_scale, bench_scale_rows, false},
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},

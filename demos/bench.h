@@ -153,6 +153,9 @@ bool bench_cloth(uint32_t n, uint32_t threads, uint32_t steps, double* milliseco
 /* bench_bounces.c */
 int bench_bounces(const bench_options* options);
 size_t bench_bounces_rows(bench_row* rows, size_t capacity);
+/* bench_screen.c */
+int bench_screen(const bench_options* options);
+size_t bench_screen_rows(bench_row* rows, size_t capacity);
 /* bench_micro.c */
 int bench_micro(const bench_options* options);
 size_t bench_micro_rows(bench_row* rows, size_t capacity);

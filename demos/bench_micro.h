@@ -17,6 +17,7 @@ typedef struct micro_bench {
     uint32_t exponent;        /* 2^exponent points, where they are not what is varied */
     uint32_t frames;          /* timed, after one that is not */
     double seconds;           /* after which no more frames are timed, once one has been */
+    float contact_reach;      /* metres within which any surface is near (micro_stage); 0: as there */
     uint32_t truth_samples;
     double truth_seconds;
 } micro_bench;

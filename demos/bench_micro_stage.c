@@ -96,7 +96,7 @@ static float near_share(const es_bvh* bvh, es_vec3 place, const float* n, float 
     return (float)count / RAYS;
 }
 
-/* Near: a quarter of the hemisphere ends within 3 % of the scene's extent. */
+/* Near: a quarter of the hemisphere ends within 3 % of the scene's extent, or one ray of it within contact_reach. */
 static bool mark_pixels(micro_bench* bench, micro_stage* stage)
 {
     es_renderer_settings settings = es_default_renderer_settings();
@@ -114,11 +114,12 @@ static bool mark_pixels(micro_bench* bench, micro_stage* stage)
                  es_world_camera_view(stage->world, es_world_active_camera(stage->world), bench->width, bench->height, &view) == ES_OK && es_world_bounds(stage->world, &low, &high);
     const size_t pixels = (size_t)bench->width * bench->height;
     stage->contact = works ? calloc(pixels, 1) : NULL;
-    const float reach = works ? 0.03f * sqrtf((high.x - low.x) * (high.x - low.x) + (high.y - low.y) * (high.y - low.y) + (high.z - low.z) * (high.z - low.z)) : 0;
+    const bool any = bench->contact_reach > 0;
+    const float share = any ? 0.01f : 0.25f, reach = any ? bench->contact_reach : works ? 0.03f * sqrtf((high.x - low.x) * (high.x - low.x) + (high.y - low.y) * (high.y - low.y) + (high.z - low.z) * (high.z - low.z)) : 0;
     for (size_t i = 0; stage->contact && i < pixels; i++) {
         if (!(depth.pixels[i] > 0)) continue;
         const es_vec3 place = place_of(&view, (uint32_t)(i % bench->width), (uint32_t)(i / bench->width), depth.pixels[i]);
-        stage->contact[i] = (uint8_t)((near_share(bvh, place, normal.pixels + 3 * i, reach) >= 0.25f) | (specular.pixels[i * specular.channels] > 0) << 1);
+        stage->contact[i] = (uint8_t)((near_share(bvh, place, normal.pixels + 3 * i, reach) >= share) | (specular.pixels[i * specular.channels] > 0) << 1);
     }
     es_image_destroy(bench->context, &depth);
     es_image_destroy(bench->context, &normal);

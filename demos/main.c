@@ -40,7 +40,7 @@ static const char usage[] =
     "             --diff OUT.png --scale X              where the error lies, in false colour, brightest at X\n"
     "             --map absolute|relative|signed|flip|hdr-flip    what --diff shows\n"
     "             --display-referred --threads N        0 … 1 as displayed, not radiance; all threads unless said\n"
-    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), error, ledger, bounces, micro, scale, frame,\n"
+    "  earthshine bench  [NAME …] [--out DIR]           measures: speed (default), error, ledger, bounces, micro, screen, scale, frame,\n"
     "                                                   moving, scenes, time, rays, dynamics, all;\n"
     "                                                   tables, JSON, CSV, SVG and one page, DIR/index.html\n"
     "             --threads N (2) --runs N (5) --only ROW --no-peer --quick\n"

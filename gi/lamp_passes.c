@@ -8,9 +8,13 @@
 /* Close by, a light is a disc of the area that it stands for. */
 #define LAMP_SPREAD 1.0f
 
+/* The environment's light may be found in screen space (gi/screen/passes.h): its lights then make a bounce, and light no pixels. */
+static bool sky_in_screen_space(const es_renderer* r) { return r->settings.lamps == ES_LAMPS_SCREEN || r->settings.lamps == ES_LAMPS_AMBIENT; }
+static bool environment_in_set(const es_renderer* r) { return r->plan.valid[ES_PASS_ENVIRONMENT] && !(sky_in_screen_space(r) && r->settings.method == ES_GI_NONE); }
+
 static const char* no_lamps(const es_renderer* r, const es_frame_inputs* in)
 {
-    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : es_something_glows(in->list) || r->plan.valid[ES_PASS_ENVIRONMENT] ? NULL : "nothing glows";
+    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : es_something_glows(in->list) || environment_in_set(r) ? NULL : "nothing glows";
 }
 
 es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
@@ -23,7 +27,7 @@ es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
         es_lamps_free(r->context, &r->lamps.set);
         return ES_OK;
     }
-    const es_environment_map* environment = r->plan.valid[ES_PASS_ENVIRONMENT] ? &r->environment : NULL;
+    const es_environment_map* environment = environment_in_set(r) ? &r->environment : NULL;
     const es_lamp_request request = {.list = in->list, .materials = in->revisions.materials, .count = s->lamp_count, .subsets = s->lamp_interleave * s->lamp_interleave, .seed = s->seed,
         .environment = environment, .centre = es_v3_scale(es_v3_add(in->bounds_min, in->bounds_max), 0.5f), .extent = in->extent};
     es_plan_begin(plan, ES_PASS_LAMPS);
@@ -31,7 +35,7 @@ es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, &request.centre, sizeof request.centre);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
-    const uint32_t words[] = {request.count, request.subsets, request.seed};
+    const uint32_t words[] = {request.count, request.subsets, request.seed, environment != NULL};
     es_plan_reads(plan, words, sizeof words);
     es_plan_reads(plan, &in->extent, sizeof in->extent);
     if (!es_plan_run(plan, ES_PASS_LAMPS)) return ES_OK;
@@ -86,8 +90,6 @@ es_shade_job es_lamps_at_points(const es_renderer* r)
         .slope_bias = s->lamp_slope_bias * r->frame.extent, .spread = LAMP_SPREAD, .geometry_bound = ES_UNBOUNDED, .lobe_roughness = s->lamp_roughness, .interleave = 1};
 }
 
-/* The environment's light may be found in screen space (gi/screen/passes.h): its lights then make a bounce, and light no pixels. */
-static bool sky_in_screen_space(const es_renderer* r) { return r->settings.lamps == ES_LAMPS_SCREEN || r->settings.lamps == ES_LAMPS_AMBIENT; }
 static uint32_t shaded_count(const es_renderer* r) { return sky_in_screen_space(r) ? r->lamps.set.glowing : r->lamps.set.shaded_count; }
 
 static es_result shade(es_renderer* r, const es_frame_inputs* in)

@@ -17,7 +17,7 @@
 
 #define ES_SCREEN_RISE 0.02f
 /* Of the radius, beyond which an occluder begins to fade: shares squared. */
-#define ES_SCREEN_FADE2 0.49f
+#define ES_SCREEN_FADE2 0.81f
 
 /* Eight pixels' surfaces as a view sees them, or would. */
 typedef struct es_screen_pixel_v {
@@ -138,7 +138,7 @@ VINL es_screen_pixel_v es_screen_pixel_at_v(const es_screen_view* view, const vf
 /* ---- shadows along a segment (thesis §4.5.1) ----------------------------------------------------------------------------------- */
 
 /* How much further than the depth bias the segment goes: there the fade begins. */
-#define ES_SCREEN_SEGMENT 1.4285715f /* 1 / √ES_SCREEN_FADE2 */
+#define ES_SCREEN_SEGMENT 1.1111112f /* 1 / √ES_SCREEN_FADE2 */
 
 /* The share of light that is left at eight pixels when `samples` places of a segment of that length (metres, more than 0) towards it are tested. */
 VINL vf es_screen_segment_share_v(const es_screen_view* view, const es_screen_pixel_v* pixel, const vf towards[3], vf length, uint32_t samples)

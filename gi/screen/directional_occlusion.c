@@ -12,9 +12,9 @@ static void put_offset(const es_screen_view* view, es_vec3 v, uint32_t column, e
 static float* look_up(es_arena* arena, const es_environment_lookup* environment, const es_occlusion_job* job)
 {
     const uint32_t patterns = job->sets * job->sets, count = 2 * patterns * job->samples, room = (count + 7) / 8 * 8;
-    float* memory = es_arena_allocate(arena, (size_t)room * 10 * sizeof *memory);
+    float* memory = es_arena_allocate(arena, (size_t)room * 13 * sizeof *memory);
     if (!memory) return NULL;
-    float *x = memory + 3 * (size_t)room, *y = x + room, *z = y + room, *roughness = z + room, *light[3] = {roughness + room, roughness + 2 * (size_t)room, roughness + 3 * (size_t)room};
+    float *x = memory + 3 * (size_t)room, *y = x + room, *z = y + room, *roughness = z + room, *light[3] = {roughness + room, roughness + 2 * (size_t)room, roughness + 3 * (size_t)room}, *unused = memory + 10 * (size_t)room;
     /* each direction stands for its share of what all patterns together look at; a lobe of that solid angle has alpha² = solid angle / 12 pi */
     const float width = es_sqrt(es_sqrt(4.0f * ES_PI / (float)count / (12.0f * ES_PI)));
     for (uint32_t i = 0; i < room; i++) {
@@ -26,7 +26,7 @@ static float* look_up(es_arena* arena, const es_environment_lookup* environment,
         z[i] = sign * s.direction.z;
         roughness[i] = width;
     }
-    const es_environment_question question = {.x = x, .y = y, .z = z, .roughness = roughness, .radiance = {light[0], light[1], light[2]}, .count = room};
+    const es_environment_question question = {.x = x, .y = y, .z = z, .roughness = roughness, .radiance = {light[0], light[1], light[2]}, .irradiance = {unused, unused + room, unused + 2 * (size_t)room}, .count = room};
     es_environment_ask(arena->context, environment, &question);
     float most = 1e-30f;
     for (int k = 0; k < 3; k++)

@@ -35,7 +35,7 @@ es_screen_sample es_screen_sample_at(uint32_t sets, uint32_t samples, uint32_t x
     const float z = coordinate(0, index), r = es_sqrt(es_maxf(1.0f - z * z, 0.0f));
     float sine, cosine;
     es_sincos(2.0f * ES_PI * coordinate(1, index), &sine, &cosine);
-    return (es_screen_sample){es_v3(r * cosine, r * sine, z), coordinate(2, index)};
+    return (es_screen_sample){es_v3(r * cosine, r * sine, z), es_sqrt(coordinate(2, index))};
 }
 
 es_screen_disc_sample es_screen_disc_sample_at(uint32_t sets, uint32_t samples, uint32_t x, uint32_t y, uint32_t i)

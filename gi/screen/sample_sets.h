@@ -10,7 +10,8 @@
 
 enum { ES_SCREEN_MAX_SETS = 8, ES_SCREEN_MAX_SAMPLES = 64 };
 
-/* λω: a unit direction of the hemisphere about +z, uniform by solid angle, and a share of the radius. Turned round where it lies below a surface, a
+/* λω: a unit direction of the hemisphere about +z, uniform by solid angle, and a share of the radius, whose square is uniform: one at x of the radius is
+ * found to occlude by 1 - x² of the samples towards it, if it is thick. Turned round where it lies below a surface, a
  * direction is one of the surface's own hemisphere, as evenly spread. */
 typedef struct es_screen_sample { es_vec3 direction; float length; } es_screen_sample;
 
