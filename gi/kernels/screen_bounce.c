@@ -49,12 +49,14 @@ VINL void add_patches(const es_screen_bounce_job* job, const es_screen_view* vie
     const vm near = at->inside & vm_gt(found, zero) & vm_lt(vf_abs(found - r->pixel.depth), reach);
     if (!vm_any(near)) return;
     const vf d = vf_select(near, found, r->pixel.depth);
+    /* what lies in the surface's own plane, which most does, is above or below it by a rounding */
+    const vf step = d - r->pixel.depth, x = orthographic ? at->x : at->x * d, y = orthographic ? at->y : at->y * d;
+    if (!vm_any(near & vm_gt(step * r->pixel.nv + (x * r->pixel.nx + y * r->pixel.ny), r->pixel.depth * vf_set1(1e-5f)))) return;
     vf rise, distance2 = es_screen_distance2_v(view, &r->pixel, at, d, &rise);
-    vm lit = near & es_screen_rises_v(rise, distance2) & vm_lt(distance2 * inverse_radius2, one);
+    vm lit = near & vm_gt(rise, r->pixel.depth * vf_set1(1e-5f)) & es_screen_rises_v(rise, distance2) & vm_lt(distance2 * inverse_radius2, one);
     if (!vm_any(lit)) return;
     /* from the pixel to the patch, and the patch's ray */
     vf to[3], v[3], received = zero;
-    const vf step = d - r->pixel.depth, x = orthographic ? at->x : at->x * d, y = orthographic ? at->y : at->y * d;
     const float *bx = orthographic ? rays->base_dx : rays->dir_dx, *by = orthographic ? rays->base_dy : rays->dir_dy;
     for (int k = 0; k < 3; k++) {
         to[k] = step * r->v[k] + (x * vf_set1(bx[k]) + y * vf_set1(by[k]));

@@ -60,28 +60,30 @@ VINL void occlude_row(const es_occlusion_job* job, uint32_t y, bool simple, bool
             }
             pixels[v] = es_screen_pixel_at_v(other, p, t);
         }
-        vf sum[3] = {zero, zero, zero}, all[3] = {zero, zero, zero};
+        vf hidden[3] = {zero, zero, zero}, all[3] = {zero, zero, zero};
         const uint32_t column = x % job->sets;
         for (uint32_t i = 0; i < job->samples; i++) {
             const es_occlusion_sample* s = &job->table[first + i];
             const vf cosine = n[0] * vf_load(s->direction[0] + column) + n[1] * vf_load(s->direction[1] + column) + n[2] * vf_load(s->direction[2] + column);
             const vi sign = vi_from_bits(cosine) & vi_set1(INT32_MIN);
-            const vf c = vf_abs(cosine), arrives = one - blocked_at(job, pixels, first + i, column, sign, inverse_radius2, simple), part = c * arrives;
+            const vf c = vf_abs(cosine), blocked = blocked_at(job, pixels, first + i, column, sign, inverse_radius2, simple);
+            const bool any = vm_any(vm_gt(blocked, zero));
             if (!directional) {
-                sum[0] = sum[0] + part;
                 all[0] = all[0] + c;
+                if (any) hidden[0] = hidden[0] + c * blocked;
                 continue;
             }
             const vm below = vi_lt(sign, vi_zero());
+            vf light[3];
             for (int k = 0; k < 3; k++) {
-                const vf light = vf_select(below, vf_load(s->light[1][k] + column), vf_load(s->light[0][k] + column));
-                sum[k] = sum[k] + part * light;
-                all[k] = all[k] + c * light;
+                light[k] = c * vf_select(below, vf_load(s->light[1][k] + column), vf_load(s->light[0][k] + column));
+                all[k] = all[k] + light[k];
             }
+            for (int k = 0; k < 3 && any; k++) hidden[k] = hidden[k] + light[k] * blocked;
         }
         for (int k = 0; k < (directional ? 3 : 1); k++) {
             const vm lit = seen & vm_gt(all[k], vf_set1(1e-20f));
-            vf_store(job->share[k] + at, vf_select(lit, sum[k] / vf_select(lit, all[k], one), one));
+            vf_store(job->share[k] + at, vf_max(one - vf_and(lit, hidden[k]) / vf_select(lit, all[k], one), zero));
         }
     }
 }

@@ -102,7 +102,7 @@ VINL vf es_screen_blocked_v(const es_screen_view* view, const es_screen_pixel_v*
     for (uint32_t layer = 0; layer < (first ? 1 : view->layer_count); layer += 2) {
         const vf d = vf_gather(view->layers[layer]->depth, at.at);
         behind = behind & vm_gt(d, zero) & vm_lt(d, at.depth);
-        if (!first && !vm_any(behind)) break;
+        if (!vm_any(behind)) break; /* most points are in the open */
         vf rise, distance2 = es_screen_distance2_v(view, p, &at, vf_min(d, at.depth), &rise);
         const vm rises = es_screen_rises_v(rise, distance2);
         vm within = behind;
