@@ -207,6 +207,10 @@ static es_renderer_settings small_settings(void)
     s.classic_size = 32;
     s.traced_samples = 1;
     s.interleave = 2;
+    s.lamp_count = 24;
+    s.lamp_size = 32;
+    s.lamp_vpls = 8;
+    s.lamp_interleave = 2;
     return s;
 }
 
@@ -393,6 +397,13 @@ static es_result make_step(making* m, es_context* context)
     case 11:
         return es_world_add_skin(world, &(es_skin_desc){"a skin", m->morphed, m->node, 1, &m->node, NULL, 1, (const uint32_t[]){0, 0, 0}, (const float[]){1, 1, 1}}, &m->skin);
     case 12: return es_world_recompute_normals(world, m->mesh);
+    case 13: {
+        es_area_light_desc desc = es_default_area_light_desc();
+        es_area_light light;
+        desc.name = "an area light";
+        desc.shape = ES_AREA_SPHERE;
+        return es_world_add_area_light(world, &desc, &light);
+    }
     default: return es_world_step(world, 0.5f);
     }
 }
@@ -401,7 +412,7 @@ static es_result make(bench* w, const operation* o, void** object)
 {
     making* m = *object ? *object : calloc(1, sizeof *m);
     *object = m;
-    for (; m->stage < 14; m->stage++) {
+    for (; m->stage < 15; m->stage++) {
         es_result result = make_step(m, w->context);
         if (result) return result;
     }
@@ -716,6 +727,17 @@ static es_result frame(bench* w, const operation* o, void** object)
     return result ? result : es_renderer_render(renderer, w->world);
 }
 
+/* Under a sky, which lights by rays; the hash of the frame is what is compared. */
+static es_result frame_under_sky(bench* w, const operation* o, void** object)
+{
+    es_result result = *object ? ES_OK : es_world_set_environment(w->world, &(es_environment_desc){.radiance = {0.2f, 0.3f, 0.4f}});
+    es_renderer_settings settings = small_settings();
+    settings.method = ES_GI_NONE;
+    settings.lamps = ES_LAMPS_TRACED;
+    if (!result && !*object) result = es_renderer_create(w->context, &settings, (es_renderer**)object);
+    return result ? result : es_renderer_render(*object, w->world);
+}
+
 /* After a frame everything has its memory; another size and a moved ball want more of it. */
 static es_result next_frame_prepare(bench* w, const operation* o, void** object)
 {
@@ -891,6 +913,7 @@ static const operation operations[] = {
     {"set an environment", WORLD | IMAGES, NULL, environment, environment_hash, NULL},
     {"restore a world", WORLD, restore_prepare, restore, bench_hash, free_object},
     {"frame, none", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_NONE},
+    {"frame, sky", WORLD, NULL, frame_under_sky, frame_hash, renderer_destroy, NULL},
     {"frame, ism", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_ISM},
     {"frame, classic", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_CLASSIC},
     {"frame, vpl-traced", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_VPL_TRACED},

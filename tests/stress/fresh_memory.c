@@ -16,7 +16,7 @@ static void* allocate(void* user, size_t size, size_t alignment)
 
 static void release(void* user, void* pointer, size_t size) { free(pointer); }
 
-enum { METHODS = 11, IMAGES_MAX = 64 };
+enum { METHODS = 14, IMAGES_MAX = 64 };
 
 static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
 {
@@ -26,9 +26,18 @@ static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
     desc.allocator = (es_allocator){allocate, release, &with};
     stress s = stress_open_in(&desc, 1, es_v3(0, 0, 0));
     stress_room(&s);
+    es_area_light_desc panel = es_default_area_light_desc();
+    es_area_light light;
+    es_image sky;
+    assert_int_equal(es_image_create(s.context, 5, 3, 3, &sky), ES_OK);
+    for (uint32_t i = 0; i < 5 * 3 * 3; i++) sky.pixels[i] = i == 4 ? 40.0f : 0.5f;
+    assert_int_equal(es_world_add_area_light(s.world, &panel, &light), ES_OK);
+    assert_int_equal(es_world_set_environment(s.world, &(es_environment_desc){.image = &sky, .radiance = {1, 1, 1}}), ES_OK);
+    es_image_destroy(s.context, &sky);
+    assert_int_equal(es_world_step(s.world, 0), ES_OK);
     /* odd sizes leave padding in rows, and phases and blocks that are not full */
     for (uint32_t i = 0; i < METHODS; i++) {
-        es_renderer_settings settings = stress_settings(i == 8 ? 1 : 53, i == 8 ? 3 : 37, i < 4 ? i : i < 6 ? ES_GI_VPL_TRACED : i == 6 ? ES_GI_VPL_SAMPLED : i > 8 ? ES_GI_MICRO : ES_GI_ISM);
+        es_renderer_settings settings = stress_settings(i == 8 ? 1 : 53, i == 8 ? 3 : 37, i < 4 ? i : i < 6 ? ES_GI_VPL_TRACED : i == 6 ? ES_GI_VPL_SAMPLED : i == 9 || i == 10 || i == 13 ? ES_GI_MICRO : ES_GI_ISM);
         settings.vpls = 70;
         settings.interleave = 3;
         settings.traced_bias = i == 4 ? ES_TRACED_UNBOUNDED : i == 5 ? ES_TRACED_COMPENSATED : ES_TRACED_BOUNDED;
@@ -39,6 +48,13 @@ static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
         settings.micro_size = i == 10 ? 20 : 12;
         settings.micro_nodes = i == 10 ? ES_MICRO_FLOAT : ES_MICRO_QUANTISED;
         settings.near_distance = i == 6 ? 0.1f : 0.0f;
+        /* in half of them the set is of lamps and sky, by maps or rays */
+        settings.lamps = i % 2 || i > 10 ? i == 12 ? ES_LAMPS_TRACED : ES_LAMPS_MAPS : ES_LAMPS_NONE;
+        settings.lamp_count = 37;
+        settings.lamp_size = 32;
+        settings.lamp_interleave = i == 11 ? 5 : 3;
+        settings.lamp_vpls = 9;
+        settings.bounces = i == 11 ? 2 : settings.bounces;
         es_renderer* renderer = stress_render(&s, &settings);
         assert_all_finite(&s, renderer, "fresh memory");
         for (size_t k = 0; k < es_image_name_count() && k < IMAGES_MAX; k++) {
