@@ -225,10 +225,10 @@ int bench_lamps(const bench_options* options)
     bench.width = options->width ? options->width : options->quick ? 64 : 1024;
     bench.height = options->height ? options->height : options->quick ? 48 : 768;
     bench.frames = options->quick ? 2 : 9;
-    bench.truth_width = options->width ? options->width : options->quick ? 32 : 256;
-    bench.truth_height = options->height ? options->height : options->quick ? 24 : 192;
+    bench.truth_width = options->width ? options->width : options->quick ? 32 : 1024;
+    bench.truth_height = options->height ? options->height : options->quick ? 24 : 768;
     bench.truth_samples = options->samples ? options->samples : options->quick ? 4 : 512;
-    bench.truth_seconds = options->quick ? 2 : 60;
+    bench.truth_seconds = options->quick ? 2 : 100;
     bench_report report = {.name = "lamps", .title = "Lamps and sky", .about = "Direct light of a curved area light and of the sky, by sets of lights with imperfect shadow maps or rays; 1024 × 768, two threads, unless a row says otherwise."};
     es_context_desc desc = es_default_context_desc();
     desc.logger = demo_logger();

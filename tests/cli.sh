@@ -414,6 +414,8 @@ expect 0 bench bounces --quick --only bounce-2-cornell --size 48x32 --spp 2 --th
 refused 'did you mean micro-refit' bench micro --only micro-refi
 expect 0 bench micro --quick --no-peer --size 48x32 --spp 2 --threads 2 --out figures --only micro-sixteenth --only micro-refit --only micro-error-cornell --only micro-equal-time-contact-cornell --only micro-ring-ggx-0.2
 says '^micro-error-cornell +[0-9.]+ relRMSE'
+expect 0 bench lamps --quick --size 48x32 --spp 2 --threads 2 --only lamps-curved-512 --only lamps-sky-error-maps
+says '^lamps-curved-512 +[0-9.]+ ms '
 expect 0 bench scale --quick --only scale-threads --size 64x48 --threads 2 --out figures
 says '^scale-threads +[0-9.]+ x '
 refused '--spp 1' bench error --spp 1
