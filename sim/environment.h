@@ -4,6 +4,10 @@
 
 #include "sim/world.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define ES_RADIANCE_LIMIT 1e12f /* a radiance times a texel of the same limit stays finite */
 
 /* Sines of the elevations between which the rows lie: height + 1 from 1 to -1. */
@@ -13,8 +17,12 @@ void es_elevation_sines(uint32_t height, double* sines);
  * after es_fail, with *copy zero. */
 bool es_environment_copy(es_context* context, const char* label, const es_image* image, es_image* copy);
 
-/* Six faces of a cube to a lat-long image. A face's row 0 is at the top, as glTF's EXT_lights_image_based and OpenGL have them: +X, -X, +Y, -Y, +Z, -Z, seen from
- * the middle, left and right exchanged. The faces have one size and three channels or more. */
-bool es_environment_from_cube(es_context* context, const es_image faces[6], es_image* image);
+/* Six faces of a cube, +X, -X, +Y, -Y, +Z, -Z, as they are seen from its middle (EXT_lights_image_based; OpenGL's, left and right exchanged), to a lat-long image; the
+ * cube is turned by `rotation`. The faces have one size and three channels or more. */
+bool es_environment_from_cube(es_context* context, const es_image faces[6], es_quat rotation, es_image* image);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -138,7 +138,7 @@ static void face_at(const es_image* face, float u, float v, float rgb[3])
     }
 }
 
-/* OpenGL 4.6 specification, table 8.19 */
+/* OpenGL 4.6 specification, table 8.19, but s from the other side */
 static void cube_at(const es_image faces[6], es_vec3 d, float rgb[3])
 {
     const float ax = es_absf(d.x), ay = es_absf(d.y), az = es_absf(d.z);
@@ -160,14 +160,15 @@ static void cube_at(const es_image faces[6], es_vec3 d, float rgb[3])
         t = -d.y;
         major = az;
     }
-    face_at(&faces[face], 0.5f * (s / major + 1.0f), 0.5f * (t / major + 1.0f), rgb);
+    face_at(&faces[face], 0.5f * (1.0f - s / major), 0.5f * (t / major + 1.0f), rgb);
 }
 
-bool es_environment_from_cube(es_context* context, const es_image faces[6], es_image* image)
+bool es_environment_from_cube(es_context* context, const es_image faces[6], es_quat rotation, es_image* image)
 {
     enum { PARTS = 2 }; /* of a texel, along each side */
     uint32_t width = 4 * faces[0].width;
     if (width > ES_ENVIRONMENT_MAX_WIDTH) width = ES_ENVIRONMENT_MAX_WIDTH;
+    const es_quat back = {-rotation.x, -rotation.y, -rotation.z, rotation.w};
     if (es_image_create(context, width, width / 2, 3, image) != ES_OK) return false;
     for (uint32_t y = 0; y < image->height; y++)
         for (uint32_t x = 0; x < image->width; x++) {
@@ -177,7 +178,7 @@ bool es_environment_from_cube(es_context* context, const es_image faces[6], es_i
                 float sine, cosine, s, c, rgb[3];
                 es_sincos(ES_PI * v, &sine, &cosine);
                 es_sincos(2.0f * ES_PI * (u - 0.5f), &s, &c);
-                cube_at(faces, es_v3(sine * s, cosine, -sine * c), rgb);
+                cube_at(faces, es_quat_rotate(back, es_v3(sine * s, cosine, -sine * c)), rgb);
                 for (int k = 0; k < 3; k++) out[k] += rgb[k] * (1.0f / (PARTS * PARTS));
             }
         }

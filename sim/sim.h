@@ -66,7 +66,8 @@ ES_API const char* const* es_scene_settings(const char* name);
 /* settings NULL: defaults. SCENE_UNKNOWN names the nearest. */
 ES_API es_result es_world_create_scene(es_context* context, const char* name, const es_world_settings* settings, es_world** world);
 /* .gltf or .glb by content. What is left out is warned of; what cannot be shown at all is refused. A file without a camera gets
- * one that frames it; without a light, a directional light of 3 W/m² from above the camera's left shoulder.
+ * one that frames it; without a light, a directional light of 3 W/m² from above the camera's left shoulder. EXT_lights_image_based of the
+ * scene becomes the environment: the first level of its cube, RGBD or sRGB; the rest follows from that.
  *
  * Skins, morph targets and animations play, also of lights, cameras and nodes by KHR_animation_pointer. Bodies come from
  * KHR_physics_rigid_bodies with KHR_implicit_shapes, or, on nodes without it, from extras (all members optional, SI units, node's axes):

@@ -423,6 +423,76 @@ static void primitive_modes(void** state)
     }
 }
 
+/* ---- EXT_lights_image_based ---------------------------------------------------------------------------------------------------- */
+
+#ifdef ES_WITH_PNG
+#define IBL(scene, light, images) \
+    "{" ASSET ",'extensionsUsed':['EXT_lights_image_based'],'extensionsRequired':['EXT_lights_image_based'],'scene':0,'scenes':[{'nodes':[0],'extensions':{'EXT_lights_image_based':" scene "}}]," \
+    "'extensions':{'EXT_lights_image_based':{'lights':[" light "]}},'images':[" images "]," \
+    "'nodes':[{'mesh':0}],'meshes':[{'primitives':[{'attributes':{'POSITION':0}}]}]," BUFFER(36) ",'bufferViews':[{'buffer':0,'byteLength':36}]," \
+    "'accessors':[{'bufferView':0,'componentType':5126,'count':3,'type':'VEC3'}]}"
+#define FACES "{'uri':'f0.png'},{'uri':'f1.png'},{'uri':'f2.png'},{'uri':'f3.png'},{'uri':'f4.png'},{'uri':'f5.png'}"
+
+/* What the environment has towards a direction, red and green. */
+static void environment_is(const es_world* world, float x, float y, float z, double red, double green)
+{
+    es_environment_desc e;
+    assert_true(es_world_get_environment(world, &e) && e.image);
+    double length = sqrt((double)(x * x + y * y + z * z)), u = atan2((double)x, -(double)z) / 6.283185307179586 + 0.5, v = acos((double)y / length) / 3.141592653589793;
+    const float* texel = e.image->pixels + 3 * ((uint32_t)fmin(v * e.image->height, e.image->height - 1) * e.image->width + (uint32_t)((u - floor(u)) * e.image->width));
+    if (!(fabs((double)(texel[0] * e.radiance[0]) - red) < 0.01 && fabs((double)(texel[1] * e.radiance[1]) - green) < 0.01))
+        fail_msg("towards (%g, %g, %g): %g and %g, not %g and %g", (double)x, (double)y, (double)z, (double)(texel[0] * e.radiance[0]), (double)(texel[1] * e.radiance[1]), red, green);
+}
+
+/* Faces of a red of their own, whose green is the half to the right as seen from the middle. */
+static void image_based_light(void** state)
+{
+    for (uint32_t f = 0; f < 6; f++) {
+        es_image face;
+        assert_int_equal(es_image_create(fixture.context, 8, 8, 3, &face), ES_OK);
+        for (uint32_t i = 0; i < 64; i++) {
+            face.pixels[3 * i] = (float)(f + 1) / 8;
+            face.pixels[3 * i + 1] = i % 8 >= 4;
+        }
+        char name[16];
+        snprintf(name, sizeof name, "f%u.png", f);
+        assert_int_equal(es_image_save(fixture.context, &face, path_of(name), NULL), ES_OK);
+        es_image_destroy(fixture.context, &face);
+    }
+    es_world* world = load(IBL("{'light':0}", "{'intensity':2,'specularImageSize':8,'irradianceCoefficients':[],'specularImages':[[0,1,2,3,4,5]]}", FACES), triangle, 36);
+    size_t count;
+    es_world_lights(world, &count);
+    assert_int_equal(count, 0); /* there is light, so none is made up */
+    environment_is(world, 1, 0.2f, 0.5f, 2.0 / 8, 2);
+    environment_is(world, 1, 0.2f, -0.5f, 2.0 / 8, 0);
+    environment_is(world, -1, 0.2f, -0.5f, 4.0 / 8, 2);
+    environment_is(world, 0.2f, 1, 0.2f, 6.0 / 8, 0);
+    environment_is(world, -0.4f, 1, 0.2f, 6.0 / 8, 2);
+    environment_is(world, -0.4f, -1, 0.2f, 8.0 / 8, 2);
+    environment_is(world, -0.5f, 0, 1, 10.0 / 8, 2);
+    environment_is(world, 0.5f, 0, -1, 12.0 / 8, 2);
+    es_world_destroy(world);
+    /* a quarter turn about y takes what was at +x to -z */
+    world = load(IBL("{'light':0}", "{'rotation':[0,0.70710678,0,0.70710678],'specularImages':[[0,1,2,3,4,5]]}", FACES), triangle, 36);
+    environment_is(world, 0.5f, 0.2f, -1, 1.0 / 8, 1);
+    es_world_destroy(world);
+
+    refuse(ES_FILE_DAMAGED, "light: must be a whole number", IBL("{}", "{}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "light", IBL("{'light':1}", "{}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "must be an array of levels", IBL("{'light':0}", "{}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "must be an array of six images", IBL("{'light':0}", "{'specularImages':[[0,1]]}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "must be the number of an image", IBL("{'light':0}", "{'specularImages':[[0,1,2,3,4,'a']]}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "[5]", IBL("{'light':0}", "{'specularImages':[[0,1,2,3,4,6]]}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "rotation", IBL("{'light':0}", "{'rotation':[1],'specularImages':[[0,1,2,3,4,5]]}", FACES), triangle, 36);
+    refuse(ES_FILE_DAMAGED, "intensity", IBL("{'light':0}", "{'intensity':-1,'specularImages':[[0,1,2,3,4,5]]}", FACES), triangle, 36);
+    for (uint32_t f = 0; f < 6; f++) {
+        char name[16];
+        snprintf(name, sizeof name, "f%u.png", f);
+        remove(path_of(name));
+    }
+}
+#endif
+
 /* ---- materials ------------------------------------------------------------------------------------------------------------- */
 
 static void materials(void** state)
@@ -1213,6 +1283,9 @@ int main(void)
         cmocka_unit_test(refusals_of_the_text),
         cmocka_unit_test(refusals_of_accessors),
         cmocka_unit_test(refusals_of_geometry),
+#ifdef ES_WITH_PNG
+        cmocka_unit_test(image_based_light),
+#endif
         cmocka_unit_test(the_memory_cap_holds),
         cmocka_unit_test(small_files_cannot_ask_for_much),
         cmocka_unit_test(damaged_files_do_no_harm),
