@@ -49,10 +49,10 @@
     X(reflective_weights, (const es_bounce_sender* sender, const es_surfel_set* points, const es_reflective_map* map, float* weights, float* sums)) \
     /* the block whose first pixel is (x, y) */                                                                  \
     X(filter, (const es_filter_job* job, uint32_t x, uint32_t y, es_filter_scratch* scratch))                    \
-    X(screen_occlusion, (const es_occlusion_job* job, uint32_t row_begin, uint32_t row_end))                     \
+    X(screen_occlusion, (const es_occlusion_job* job, const es_screen_block* block))                             \
     X(arriving_light, (const es_arriving_job* job, uint32_t row_begin, uint32_t row_end))                        \
     X(turn_normals, (const es_gbuffer* gbuffer, uint32_t row_begin, uint32_t row_end))                           \
-    X(screen_bounce, (const es_screen_bounce_job* job, uint32_t row_begin, uint32_t row_end))                    \
+    X(screen_bounce, (const es_screen_bounce_job* job, const es_screen_block* block))                            \
     X(screen_light, (const es_screen_light_job* job, uint32_t row_begin, uint32_t row_end))                      \
     X(screen_reflect, (const es_screen_reflect_job* job, uint32_t row_begin, uint32_t row_end))                  \
     X(antialias, (const es_antialias_job* job, uint32_t row_begin, uint32_t row_end))                            \

@@ -100,14 +100,14 @@ VINL receiver seen_by(const es_screen_view* view, const receiver* r, const vf tr
 }
 
 /* `simple`: one layer of one view; a constant at every call. */
-VINL void bounce_row(const es_screen_bounce_job* job, uint32_t y, bool simple)
+VINL void bounce_row(const es_screen_bounce_job* job, const es_screen_block* block, uint32_t y, bool simple)
 {
     const es_screen_view* view = &job->stack->views[0];
     const es_gbuffer* g = view->layers[0];
     const vf zero = vf_zero(), one = vf_set1(1.0f), inverse_radius2 = vf_set1(1.0f / (job->radius * job->radius));
     const vf scale = vf_set1(2.0f * ES_PI * ES_SCREEN_DISC_LOG / (float)job->samples);
     const uint32_t first = y % job->sets * job->samples;
-    for (uint32_t x = 0; x < g->width; x += VW) {
+    for (uint32_t x = block->x0; x < block->x1; x += VW) {
         const size_t at = (size_t)y * g->stride + x;
         const vf depth = vf_load(g->depth + at);
         const vi word = vi_load(g->surface + at);
@@ -144,12 +144,12 @@ VINL void bounce_row(const es_screen_bounce_job* job, uint32_t y, bool simple)
     }
 }
 
-void ES_KERNEL(es_gi_screen_bounce)(const es_screen_bounce_job* job, uint32_t row_begin, uint32_t row_end)
+void ES_KERNEL(es_gi_screen_bounce)(const es_screen_bounce_job* job, const es_screen_block* block)
 {
     const bool simple = job->stack->view_count == 1 && job->stack->views[0].layer_count == 1;
-    for (uint32_t y = row_begin; y < row_end; y++) {
-        if (simple) bounce_row(job, y, true);
-        else bounce_row(job, y, false);
+    for (uint32_t y = block->y0; y < block->y1; y++) {
+        if (simple) bounce_row(job, block, y, true);
+        else bounce_row(job, block, y, false);
     }
 }
 

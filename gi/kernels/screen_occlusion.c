@@ -28,13 +28,13 @@ VINL vf blocked_at(const es_occlusion_job* job, const es_screen_pixel_v* pixels,
 }
 
 /* The three switches are constants at every call. */
-VINL void occlude_row(const es_occlusion_job* job, uint32_t y, bool simple, bool directional)
+VINL void occlude_row(const es_occlusion_job* job, const es_screen_block* block, uint32_t y, bool simple, bool directional)
 {
     const es_screen_view* view = &job->stack->views[0];
     const es_gbuffer* g = view->layers[0];
     const vf zero = vf_zero(), one = vf_set1(1.0f), inverse_radius2 = vf_set1(1.0f / (job->radius * job->radius));
     const uint32_t first = y % job->sets * job->samples;
-    for (uint32_t x = 0; x < g->width; x += VW) {
+    for (uint32_t x = block->x0; x < block->x1; x += VW) {
         const size_t at = (size_t)y * g->stride + x;
         const vf depth = vf_load(g->depth + at);
         const vm seen = vm_gt(depth, zero) & vm_first((int32_t)(g->width - x));
@@ -88,12 +88,12 @@ VINL void occlude_row(const es_occlusion_job* job, uint32_t y, bool simple, bool
     }
 }
 
-void ES_KERNEL(es_gi_screen_occlusion)(const es_occlusion_job* job, uint32_t row_begin, uint32_t row_end)
+void ES_KERNEL(es_gi_screen_occlusion)(const es_occlusion_job* job, const es_screen_block* block)
 {
     const bool simple = job->stack->view_count == 1 && job->stack->views[0].layer_count == 1;
-    for (uint32_t y = row_begin; y < row_end; y++) {
-        if (simple && job->directional) occlude_row(job, y, true, true);
-        else if (simple) occlude_row(job, y, true, false);
-        else occlude_row(job, y, false, job->directional);
+    for (uint32_t y = block->y0; y < block->y1; y++) {
+        if (simple && job->directional) occlude_row(job, block, y, true, true);
+        else if (simple) occlude_row(job, block, y, true, false);
+        else occlude_row(job, block, y, false, job->directional);
     }
 }

@@ -73,16 +73,20 @@ es_result es_occlusion_prepare(es_arena* arena, const es_environment_lookup* env
 
 typedef struct occlusion_loop { const es_gi_kernels* kernels; const es_occlusion_job* job; } occlusion_loop;
 
-static void rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+static void blocks(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const occlusion_loop* loop = user;
-    loop->kernels->screen_occlusion(loop->job, begin, end);
+    const es_screen_view* view = &loop->job->stack->views[0];
+    for (uint32_t i = begin; i < end; i++) {
+        const es_screen_block block = es_screen_block_at(view->width, view->height, i);
+        loop->kernels->screen_occlusion(loop->job, &block);
+    }
 }
 
 void es_occlusion(es_context* context, const es_occlusion_job* job)
 {
     occlusion_loop loop = {es_gi_kernel_table(es_context_isa(context)), job};
-    es_parallel_for(context, job->stack->views[0].height, 16, rows, &loop);
+    es_parallel_for(context, es_screen_block_count(job->stack->views[0].width, job->stack->views[0].height), 1, blocks, &loop);
 }
 
 typedef struct arriving_loop { const es_gi_kernels* kernels; const es_arriving_job* job; } arriving_loop;

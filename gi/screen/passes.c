@@ -194,7 +194,7 @@ static es_result bounce(es_renderer* r, const es_frame_inputs* in)
     if (!result) result = es_planes_resize(r->context, &b->irradiance, &r->gbuffer);
     if (!result) result = es_planes_resize(r->context, &b->bounce, &r->gbuffer);
     if (result) return result;
-    es_screen_bounce_job job = {.stack = &b->stack, .sets = s->screen_sets, .samples = s->screen_samples, .radius = s->screen_radius * in->extent,
+    es_screen_bounce_job job = {.stack = &b->stack, .sets = s->screen_sets, .samples = (s->screen_samples + 1) / 2, .radius = s->screen_radius * in->extent,
         .geometry_bound = s->method == ES_GI_NONE ? 0.0f : es_geometry_bound(s, in)};
     for (int k = 0; k < 3; k++) job.irradiance[k] = b->irradiance.at[k];
     result = es_screen_bounce_prepare(&r->arena, &job);
@@ -229,6 +229,6 @@ es_result es_pass_screen_bounce(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SCREEN_BOUNCE)) return ES_OK;
     es_result result = bounce(r, in);
-    if (!result) es_plan_done(plan, ES_PASS_SCREEN_BOUNCE, (uint64_t)r->gbuffer.width * r->gbuffer.height * s->screen_samples);
+    if (!result) es_plan_done(plan, ES_PASS_SCREEN_BOUNCE, (uint64_t)r->gbuffer.width * r->gbuffer.height * (s->screen_samples + 1) / 2);
     return result;
 }

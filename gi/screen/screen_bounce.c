@@ -28,10 +28,15 @@ es_result es_screen_bounce_prepare(es_arena* arena, es_screen_bounce_job* job)
 
 typedef struct screen_loop { const es_gi_kernels* kernels; const void* job; } screen_loop;
 
-static void bounce_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+static void bounce_blocks(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     const screen_loop* loop = user;
-    loop->kernels->screen_bounce(loop->job, begin, end);
+    const es_screen_bounce_job* job = loop->job;
+    const es_screen_view* view = &job->stack->views[0];
+    for (uint32_t i = begin; i < end; i++) {
+        const es_screen_block block = es_screen_block_at(view->width, view->height, i);
+        loop->kernels->screen_bounce(job, &block);
+    }
 }
 
 static void light_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
@@ -46,12 +51,15 @@ static void reflect_rows(void* user, uint32_t begin, uint32_t end, uint32_t work
     loop->kernels->screen_reflect(loop->job, begin, end);
 }
 
-static void run(es_context* context, const void* job, uint32_t height, es_loop_body body)
+static void run(es_context* context, const void* job, uint32_t count, uint32_t grain, es_loop_body body)
 {
     screen_loop loop = {es_gi_kernel_table(es_context_isa(context)), job};
-    es_parallel_for(context, height, 16, body, &loop);
+    es_parallel_for(context, count, grain, body, &loop);
 }
 
-void es_screen_bounce(es_context* context, const es_screen_bounce_job* job) { run(context, job, job->stack->views[0].height, bounce_rows); }
-void es_screen_light(es_context* context, const es_screen_light_job* job) { run(context, job, job->gbuffer->height, light_rows); }
-void es_screen_reflect(es_context* context, const es_screen_reflect_job* job) { run(context, job, job->gbuffer->height, reflect_rows); }
+void es_screen_bounce(es_context* context, const es_screen_bounce_job* job)
+{
+    run(context, job, es_screen_block_count(job->stack->views[0].width, job->stack->views[0].height), 1, bounce_blocks);
+}
+void es_screen_light(es_context* context, const es_screen_light_job* job) { run(context, job, job->gbuffer->height, 16, light_rows); }
+void es_screen_reflect(es_context* context, const es_screen_reflect_job* job) { run(context, job, job->gbuffer->height, 16, reflect_rows); }

@@ -21,3 +21,14 @@ es_screen_view es_screen_view_of(const es_raster_view* view, const es_gbuffer* g
     s.yy = squared(s.rays.orthographic ? s.rays.base_dy : s.rays.dir_dy);
     return s;
 }
+
+uint32_t es_screen_block_count(uint32_t width, uint32_t height)
+{
+    return (width + ES_SCREEN_BLOCK_COLUMNS - 1) / ES_SCREEN_BLOCK_COLUMNS * ((height + ES_SCREEN_BLOCK_ROWS - 1) / ES_SCREEN_BLOCK_ROWS);
+}
+
+es_screen_block es_screen_block_at(uint32_t width, uint32_t height, uint32_t index)
+{
+    const uint32_t columns = (width + ES_SCREEN_BLOCK_COLUMNS - 1) / ES_SCREEN_BLOCK_COLUMNS, x0 = index % columns * ES_SCREEN_BLOCK_COLUMNS, y0 = index / columns * ES_SCREEN_BLOCK_ROWS;
+    return (es_screen_block){x0, width - x0 < ES_SCREEN_BLOCK_COLUMNS ? width : x0 + ES_SCREEN_BLOCK_COLUMNS, y0, height - y0 < ES_SCREEN_BLOCK_ROWS ? height : y0 + ES_SCREEN_BLOCK_ROWS};
+}

@@ -28,6 +28,12 @@ typedef struct es_view_stack {
     uint32_t view_count;
 } es_view_stack;
 
+/* Pixels are gone through in blocks, so that what they look at around them stays in the second-level cache. */
+enum { ES_SCREEN_BLOCK_COLUMNS = 128, ES_SCREEN_BLOCK_ROWS = 32 };
+typedef struct es_screen_block { uint32_t x0, x1, y0, y1; } es_screen_block; /* x0: a multiple of eight */
+uint32_t es_screen_block_count(uint32_t width, uint32_t height);
+es_screen_block es_screen_block_at(uint32_t width, uint32_t height, uint32_t index);
+
 /* A view of one layer. */
 es_screen_view es_screen_view_of(const es_raster_view* view, const es_gbuffer* gbuffer);
 
