@@ -71,7 +71,7 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
     if (result) return result;
     es_shade_job job = {.gbuffer = shaded, .rays = s->half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - lights,
         .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->screen_bounce ? 0.0f : s->spread, .lobe_roughness = s->lobe_roughness,
-        .geometry_bound = s->geometry_bound / (extent * extent), .interleave = interleave_of(s)};
+        .geometry_bound = es_geometry_bound(s, &(es_frame_inputs){.extent = extent}), .interleave = interleave_of(s)};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = irradiance->at[k];
         job.specular[k] = r->has_specular ? specular->at[k] : NULL;
@@ -124,7 +124,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_BOUNCES);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
     const uint32_t interleave = interleave_of(s);
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, s->geometry_bound, s->screen_bounce ? 0.0f : s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed, (float)s->screen_repair, s->screen_radius};
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, es_geometry_bound(s, in), s->screen_bounce ? 0.0f : s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = ES_OK;

@@ -19,7 +19,12 @@
 
 /* ---- planes ------------------------------------------------------------------------------------------------------------ */
 
-float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inputs* in) { return settings->geometry_bound / (in->extent * in->extent); }
+/* With a bounce in screen space no pair closer than its radius is left to the lights alone: without spread they would show as spots there. */
+float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inputs* in)
+{
+    const float radius = settings->screen_radius, bound = settings->screen_bounce ? es_minf(settings->geometry_bound, 1.0f / (radius * radius)) : settings->geometry_bound;
+    return bound / (in->extent * in->extent);
+}
 
 es_result es_planes_resize(es_context* context, es_planes* planes, const es_gbuffer* gbuffer)
 {

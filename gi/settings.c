@@ -92,7 +92,7 @@ static const es_setting renderer_table[] = {
     {"screen.cameras", ES_SETTING_INT, "0", 0, 4, NULL, "additional cameras, of half the resolution, that show what the camera does not", AT(screen_cameras)},
     {"screen.repair", ES_SETTING_INT, "0", 0, 64, NULL, "places towards each light that are tested for what the depth bias of its shadow map leaves out; 0: none", AT(screen_repair)},
     {"screen.repair-least", ES_SETTING_FLOAT, "0", 0, 1, NULL, "screen.repair: how far away from the pixel these places reach at least, share of the scene's extent; 0: as far as the bias", AT(screen_repair_least)},
-    {"screen.bounce", ES_SETTING_BOOL, "false", 0, 1, NULL, "light that surfaces within screen.radius send each other, from half as many places: what vpl.bound leaves out (vpl.spread is 0 then), with gi none all of it; not with gi micro", AT(screen_bounce)},
+    {"screen.bounce", ES_SETTING_BOOL, "false", 0, 1, NULL, "light that surfaces within screen.radius send each other, from half as many places: what vpl.bound, then 1 / radius² at the most, leaves out (vpl.spread is 0 then), with gi none all of it; not with gi micro", AT(screen_bounce)},
 
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},

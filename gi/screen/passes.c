@@ -45,11 +45,11 @@ static es_result reserve_light(es_context* context, es_screen_layer* layer, cons
     return ES_OK;
 }
 
-/* Smooths over the patterns of the sample sets. */
-static es_result filter_patterns(es_renderer* r, uint32_t planes, const es_planes* source, const es_planes* result)
+/* Smooths over the patterns of the sample sets: once brings all of them together, twice hides the blocks that edges of what is looked at leave then. */
+static es_result filter_patterns(es_renderer* r, uint32_t passes, uint32_t planes, const es_planes* source, const es_planes* result)
 {
     const es_renderer_settings* s = &r->settings;
-    es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->screen_sets, .passes = 1, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = planes};
+    es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->screen_sets, .passes = passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = planes};
     for (uint32_t k = 0; k < planes; k++) {
         job.source[k] = source->at[k];
         job.result[k] = result->at[k];
@@ -75,7 +75,7 @@ static es_result occlude(es_renderer* r, const es_frame_inputs* in)
     result = es_occlusion_prepare(&r->arena, b->directional ? &r->environment.lookup : NULL, &job);
     if (result) return result;
     es_occlusion(r->context, &job);
-    if (s->screen_sets > 1) result = filter_patterns(r, b->directional ? 3 : 1, &b->share, &b->filtered_share);
+    if (s->screen_sets > 1) result = filter_patterns(r, 1, b->directional ? 3 : 1, &b->share, &b->filtered_share);
     if (result) return result;
     if (b->has_specular && !r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
     es_compose_job lamps = {0};
@@ -201,7 +201,7 @@ static es_result bounce(es_renderer* r, const es_frame_inputs* in)
     if (result) return result;
     es_screen_bounce(r->context, &job);
     const bool filtered = s->screen_sets > 1;
-    if (filtered) result = filter_patterns(r, 3, &b->irradiance, &b->bounce);
+    if (filtered) result = filter_patterns(r, 2, 3, &b->irradiance, &b->bounce);
     if (result) return result;
     es_screen_reflect_job reflect = {.gbuffer = &r->gbuffer};
     for (int k = 0; k < 3; k++) {
@@ -217,7 +217,7 @@ es_result es_pass_screen_bounce(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const bool lit = plan->valid[ES_PASS_DIRECT] || plan->valid[ES_PASS_LAMP_LIGHT] || plan->valid[ES_PASS_SCREEN_OCCLUSION];
-    const char* why = !s->screen_bounce ? "screen.bounce is off" : s->method == ES_GI_MICRO ? "gi is micro: it bounds nothing" : !in->has_geometry ? "nothing to light" : !lit ? plan->stats[ES_PASS_DIRECT].skipped : NULL;
+    const char* why = !s->screen_bounce ? "screen.bounce is off" : s->method == ES_GI_MICRO ? "gi is micro: it bounds nothing" : s->method != ES_GI_NONE && (s->traced_bias != ES_TRACED_BOUNDED || s->near_distance > 0.0f) ? "what is near is found by rays" : !in->has_geometry ? "nothing to light" : !lit ? plan->stats[ES_PASS_DIRECT].skipped : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_SCREEN_BOUNCE, why);
         return ES_OK;
