@@ -10,7 +10,7 @@
 enum { MOST_TAPS = 256, SOURCES = 64 /* of irradiance, along a side */, LARGEST = 512, SMALLEST = 128 };
 
 static const uint32_t lobe_sizes[ES_ENVIRONMENT_LOBES] = {128, 64, 32, 16, 16};
-static const uint32_t lobe_taps[ES_ENVIRONMENT_LOBES] = {32, 64, 128, 256, 256};
+static const uint32_t lobe_taps[ES_ENVIRONMENT_LOBES] = {64, 128, 256, 256, 256};
 
 /* ---- memory ------------------------------------------------------------------------------------------------------------ */
 
@@ -176,9 +176,9 @@ static uint32_t make_taps(float alpha, uint32_t count, float base, uint32_t leve
         es_sincos(2.0f * ES_PI * (turn - es_floor(turn)), &s, &c);
         es_environment_tap* tap = &taps[kept++];
         *tap = (es_environment_tap){{2.0f * cosine * sine * c, 2.0f * cosine * sine * s, up}, 0.0f, up};
-        /* twice as wide a texel as the direction stands for, so that neighbours overlap */
+        /* A wider texel would carry a small sun into tails where there is little else; between texels neighbours overlap as it is. */
         const float solid_angle = 1.0f / ((float)count * density), texel = 4.0f * ES_PI / (base * base);
-        tap->level = es_clampf(0.5f * es_log2(solid_angle / texel) + 1.0f, 0.0f, (float)(levels - 1));
+        tap->level = es_clampf(0.5f * es_log2(solid_angle / texel), 0.0f, (float)(levels - 1));
         total += (double)up;
     }
     for (uint32_t i = 0; i < kept; i++) taps[i].weight = (float)((double)taps[i].weight / total);

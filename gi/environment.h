@@ -10,7 +10,8 @@
  *
  * For reflection by rough surfaces, levels of radiance averaged over GGX lobes as seen along the normal (N = V = R, weighted by the
  * cosine: Karis 2013, "Real Shading in Unreal Engine 4"), by samples whose width follows their density (Křivánek and Colbert 2008, "Real-time
- * Shading with Filtered Importance Sampling"); what sampling leaves of error in a level's mean over the sphere is divided out.
+ * Shading with Filtered Importance Sampling"); what sampling leaves of error in a level's mean over the sphere is divided out. With a sun of 200 times the sky's radiance,
+ * 11 degrees wide, levels are off by 4 … 7 % RMS, and between two of them by 12 % (tests/test_environment_map.c).
  *
  * For irradiance a level of it by normal, 32 × 32: nine coefficients of spherical harmonics would be off by up to 9 % of the largest for a small bright
  * source and become negative (Ramamoorthi and Hanrahan 2001); this is off by less than 1 % of it. Its sources are the texels of a coarse level, each as the
