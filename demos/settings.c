@@ -214,8 +214,10 @@ int demo_find_image(const char* name)
     enum { MOST = 128 };
     const char* names[MOST];
     size_t count = 0;
-    int bounce = 0, end = 0; /* one stands in the list for all bounces */
+    /* one stands in the list for all of a kind */
+    int bounce = 0, step = 0, end = 0;
     if (sscanf(name, "indirect-%d%n", &bounce, &end) == 1 && !name[end] && bounce >= 1 && bounce <= ES_MAX_BOUNCES) name = "indirect-1";
+    if (sscanf(name, "compensation-%d%n", &step, &end) == 1 && !name[end] && step >= 1 && step <= ES_MAX_COMPENSATION_STEPS) name = "compensation-1";
     for (size_t i = 0; i < es_image_name_count() && i < MOST; i++) {
         if (!strcmp(es_image_name(i), name)) return (int)i;
         names[count++] = es_image_name(i);

@@ -3,6 +3,7 @@
 #define EARTHSHINE_GI_COMPOSE_H
 
 #include "gi/gi.h"
+#include "gi/screen/residual.h"
 
 /* sRGB codes of linear values by the rounded square root of the value times its last index: a step is below a tenth of a code
  * everywhere, dark end included. */
@@ -15,7 +16,7 @@ typedef enum es_further_light {
     ES_FURTHER_RAYS,              /* what bounding left out, found by rays (gi/bias_compensation.h) */
     ES_FURTHER_NEGATIVE,          /* of negative lights (gi/second_order.h) */
     ES_FURTHER_RESIDUAL,          /* what bounding left out, found in screen space: a step each (gi/screen/residual.h) */
-    ES_FURTHER_BOUNCE = ES_FURTHER_RESIDUAL + 4, /* of one bounce in screen space */
+    ES_FURTHER_BOUNCE = ES_FURTHER_RESIDUAL + ES_RESIDUAL_STEPS, /* of one bounce in screen space */
     ES_FURTHER_LIGHTS
 } es_further_light;
 
@@ -45,6 +46,7 @@ typedef struct es_compose_job {
     float* whole_direct[3];
     float* bounded[3];
     float* indirect[3];
+    float* reflected[3];          /* direct + bounded */
     float* display[3];            /* after the tone map, linear [0, 1]; NULL: not wanted */
 } es_compose_job;
 

@@ -50,7 +50,7 @@ typedef enum es_bounce_method {
     ES_BOUNCE_REFLECTIVE  /* on a texel of an imperfect reflective shadow map drawn for the reflected light (Ritschel thesis §5.3.1); slower, needs no rays */
 } es_bounce_method;
 
-enum { ES_MAX_BOUNCES = 16 };
+enum { ES_MAX_BOUNCES = 16, ES_MAX_COMPENSATION_STEPS = 4 };
 
 /* Direct light of surfaces that glow and of the environment. */
 typedef enum es_lamps_method {
@@ -188,6 +188,14 @@ typedef struct es_renderer_settings {
     uint32_t lamp_vpls;              /* virtual point lights that the first bounce of their light makes; with every method that has such lights */
     float lamp_roughness;            /* lobes sharper than this GGX roughness are widened to it under lamps */
     float lamp_slope_bias;           /* of their maps, as ism_slope_bias */
+    /* bias compensation in screen space (Novák et al. 2011), with the methods that have virtual point lights: what geometry_bound takes from their light is found
+     * again among the pixels; spread does not apply then, and with near_distance or another traced_bias than BOUNDED there is nothing to be found */
+    uint32_t compensation_steps;     /* 0: none; … ES_MAX_COMPENSATION_STEPS: times that the residual operator is applied */
+    uint32_t compensation_levels;    /* of the pyramid of pixels, 1 … 8 (§6: 6) */
+    float compensation_solid_angle;  /* projected, sr, above which a node of it is opened (§4.2: 0.08) … */
+    float compensation_discontinuity;/* … and where it spans an edge (0.04) */
+    uint32_t compensation_spacing;   /* 1, 2, 4: found at every so manieth pixel of every so manieth row, interpolated along surfaces, and found at those that have no such
+                                      * neighbours (§5: 2) */
 } es_renderer_settings;
 
 ES_API es_renderer_settings es_default_renderer_settings(void);

@@ -11,7 +11,7 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
@@ -28,6 +28,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_IRRADIANCE, "irradiance", "indirect irradiance, filtered, W/m²"},
     {IMAGE_CONFIDENCE, "confidence", "in last frame's indirect light, 0 to 1 (Knecht eq. 3.4)"},
     {IMAGE_COMPENSATION, "compensation", "of the indirect light, what traced.bias compensated finds by rays, W/(m² sr), of either sign"},
+    {IMAGE_RESIDUAL, "compensation-1", "of the indirect light, what the first of compensation.steps finds, W/(m² sr); compensation-2 … compensation-4 likewise"},
     {IMAGE_OCCLUSION, "occlusion", "share of the environment's light that lamps screen or ambient find to be kept away, mean over channels, 0 to 1"},
     {IMAGE_SCREEN_BOUNCE, "screen-bounce", "of the indirect light, what screen.bounce finds in screen space, W/(m² sr)"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
@@ -58,19 +59,21 @@ size_t es_image_name_count(void) { return IMAGE_COUNT; }
 const char* es_image_name(size_t index) { return index < IMAGE_COUNT ? images[index].name : NULL; }
 const char* es_image_description(size_t index) { return index < IMAGE_COUNT ? images[index].description : NULL; }
 
-/* n of "indirect-n", 1 … ES_MAX_BOUNCES; 0: another name. */
-static uint32_t bounce_of(const char* name)
+/* n of a name that is the prefix and n, 1 … most; 0: another name. */
+static uint32_t number_of(const char* name, const char* prefix, uint32_t most)
 {
-    static const char prefix[] = "indirect-";
-    if (strncmp(name, prefix, sizeof prefix - 1) != 0) return 0;
+    const size_t length = strlen(prefix);
+    if (strncmp(name, prefix, length) != 0) return 0;
     uint32_t n = 0;
-    for (const char* c = name + sizeof prefix - 1; *c; c++) {
+    for (const char* c = name + length; *c; c++) {
         if (*c < '0' || *c > '9' || (!n && *c == '0')) return 0;
         n = 10 * n + (uint32_t)(*c - '0');
-        if (n > ES_MAX_BOUNCES) return 0;
+        if (n > most) return 0;
     }
     return n;
 }
+static uint32_t bounce_of(const char* name) { return number_of(name, "indirect-", ES_MAX_BOUNCES); }
+static uint32_t step_of(const char* name) { return number_of(name, "compensation-", ES_RESIDUAL_STEPS); }
 
 /* ---- from packed planes --------------------------------------------------------------------------------------------------- */
 
@@ -261,7 +264,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     if (!renderer->complete) return es_misuse(context, ES_WRONG_STATE, "image \"%s\": no frame has been rendered, or the last one failed", name);
     int index = -1;
     for (int i = 0; i < IMAGE_COUNT; i++)
-        if (strcmp(images[i].name, name) == 0 || (images[i].kind == IMAGE_BOUNCE && bounce_of(name))) index = i;
+        if (strcmp(images[i].name, name) == 0 || (images[i].kind == IMAGE_BOUNCE && bounce_of(name)) || (images[i].kind == IMAGE_RESIDUAL && step_of(name))) index = i;
     if (index < 0) return unknown_image(renderer, name);
     image_kind kind = images[index].kind;
     if (kind >= IMAGE_MICRO) return es_micro_image(renderer, kind != IMAGE_MICRO_UNWARPED, kind == IMAGE_MICRO_DISTANCE, image);
@@ -305,9 +308,10 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_IRRADIANCE:
     case IMAGE_BACKGROUND:
     case IMAGE_COMPENSATION:
+    case IMAGE_RESIDUAL:
     case IMAGE_SCREEN_BOUNCE: {
         es_compose_job job = es_renderer_compose_job(renderer);
-        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : ES_FURTHER_BOUNCE];
+        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : kind == IMAGE_RESIDUAL ? ES_FURTHER_RESIDUAL + step_of(name) - 1 : ES_FURTHER_BOUNCE];
         if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }

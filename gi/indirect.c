@@ -4,6 +4,7 @@
 
 #include "gi/lit.h"
 #include "gi/near_light.h"
+#include "gi/screen/residual_pass.h"
 #include "gi/surface.h"
 #include "gi/vpl_visibility.h"
 
@@ -58,6 +59,8 @@ static bool every_light(const es_renderer_settings* s) { return s->method == ES_
 static uint32_t interleave_of(const es_renderer_settings* s) { return every_light(s) ? 1 : s->interleave; }
 static float near_distance_of(const es_renderer* r) { return r->frame.settings.traced_bias == ES_TRACED_BOUNDED ? r->frame.settings.near_distance * r->frame.extent : 0.0f; }
 
+float es_vpl_spread(const es_renderer_settings* s) { return !es_residual_nothing(s) || s->screen_bounce ? 0.0f : s->spread; }
+
 /* ---- shading ---------------------------------------------------------------------------------------------------------------- */
 
 es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradiance, es_planes* specular)
@@ -70,7 +73,7 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
     if (!result && r->has_specular) result = es_planes_resize(r->context, specular, shaded);
     if (result) return result;
     es_shade_job job = {.gbuffer = shaded, .rays = s->half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - lights,
-        .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->screen_bounce ? 0.0f : s->spread, .lobe_roughness = s->lobe_roughness,
+        .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = es_vpl_spread(s), .lobe_roughness = s->lobe_roughness,
         .geometry_bound = es_geometry_bound(s, &(es_frame_inputs){.extent = extent}), .interleave = interleave_of(s)};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = irradiance->at[k];
@@ -124,7 +127,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_BOUNCES);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
     const uint32_t interleave = interleave_of(s);
-    float numbers[] = {s->ism_bias, s->ism_slope_bias, es_geometry_bound(s, in), s->screen_bounce ? 0.0f : s->spread, s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed, (float)s->screen_repair, s->screen_radius};
+    float numbers[] = {s->ism_bias, s->ism_slope_bias, es_geometry_bound(s, in), es_vpl_spread(s), s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SHADING)) return ES_OK;
     es_result result = ES_OK;

@@ -29,6 +29,9 @@ bool es_indirect_is_there(const es_renderer* renderer);
 void es_indirect_reads(es_plan* plan);
 /* Why there is none; NULL: there is some. Once the lights are placed. */
 const char* es_indirect_nothing(const es_renderer* renderer, const es_frame_inputs* in);
+/* es_renderer_settings.spread, 0 where what is near is found in screen space: by bounds alone light is taken that pixels can find again, of what spread takes, which depends
+ * on the light, they know nothing. */
+float es_vpl_spread(const es_renderer_settings* settings);
 /* At half the resolution? */
 bool es_indirect_is_halved(const es_renderer_settings* settings);
 /* May a surface of the frame have a lobe worth evaluating? Or a virtual point light? */

@@ -20,6 +20,7 @@
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
 #include "gi/screen/directional_occlusion.h"
+#include "gi/screen/residual.h"
 #include "gi/screen/screen_bounce.h"
 #include "gi/shade.h"
 #include "gi/temporal.h"
@@ -33,6 +34,9 @@
     X(view_importance, (const es_receivers* receivers, const es_sender* senders, uint32_t count, float* result)) \
     /* rows [row_begin, row_end) */                                                                              \
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    /* gi/screen/residual.h: rows of the level, of the result */                                                 \
+    X(residual_level, (const es_residual_layer* layer, uint32_t level, uint32_t row_begin, uint32_t row_end))    \
+    X(residual_gather, (const es_residual_job* job, uint32_t row_begin, uint32_t row_end))                       \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(light_points, (const es_point_light_job* job, const es_point_forest* forest, const es_leaf_range* range))  \
     X(push_points, (const es_point_push* push, const es_point_forest* forest, const es_push_range* range)) \

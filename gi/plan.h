@@ -38,6 +38,7 @@
     X(SCREEN_VIEWS, "screen-space views", "triangles")                                                           \
     X(SCREEN_OCCLUSION, "screen-space occlusion", "samples")                                                     \
     X(SCREEN_BOUNCE, "screen-space bounce", "samples")                                                           \
+    X(RESIDUAL, "screen-space compensation", "samples")                                                          \
     X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \
     X(COMPOSE, "compose", "pixels")
 

@@ -12,6 +12,7 @@
 #include "gi/micro_passes.h"
 #include "gi/passes.h"
 #include "gi/screen/passes.h"
+#include "gi/screen/residual_pass.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -65,6 +66,7 @@ static es_result check_settings(es_context* context, const es_renderer_settings*
     if (s->bounce_points % 64) return es_fail(context, ES_SETTING_VALUE, "bounce.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->bounce_points);
     if (s->ism_points % 64) return es_fail(context, ES_SETTING_VALUE, "ism.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->ism_points);
     if (s->micro_size % 4) return es_fail(context, ES_SETTING_VALUE, "micro.size is %u; a multiple of 4 from 8 to 32 is accepted", s->micro_size);
+    if (!power_of_two(s->compensation_spacing)) return es_fail(context, ES_SETTING_VALUE, "compensation.spacing is %u; 1, 2 and 4 are accepted", s->compensation_spacing);
     if (!power_of_two(s->micro_spacing)) return es_fail(context, ES_SETTING_VALUE, "micro.spacing is %u; 1, 2 and 4 are accepted", s->micro_spacing);
     return ES_OK;
 }
@@ -105,6 +107,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->irradiance);
     es_planes_free(context, &renderer->specular);
     es_planes_free(context, &renderer->compensation);
+    es_residual_buffers_free(context, &renderer->residual);
     es_history_free(context, &renderer->history);
     es_micro_free_planes(context, &renderer->micro);
     es_lamps_free_planes(context, &renderer->lamps);
@@ -472,6 +475,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (es_indirect_is_there(r) && r->has_specular) job.specular[k] = specular->at[k];
         if (r->plan.valid[ES_PASS_COMPENSATION]) job.further[ES_FURTHER_RAYS][k] = r->compensation.at[k];
         if (r->plan.valid[ES_PASS_SCREEN_BOUNCE]) job.further[ES_FURTHER_BOUNCE][k] = r->screen.bounce.at[k];
+        for (uint32_t i = 0; i < es_residual_steps(r); i++) job.further[ES_FURTHER_RESIDUAL + i][k] = r->residual.steps[i].at[k];
         if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
     return job;
@@ -493,6 +497,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
     es_screen_reads(plan);
+    es_plan_reads_pass(plan, ES_PASS_RESIDUAL);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -535,6 +540,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_upsample(r, in);
     if (!result) result = es_pass_screen_occlusion(r, in);
     if (!result) result = es_pass_screen_bounce(r, in);
+    if (!result) result = es_pass_residual(r, in);
     return result ? result : es_pass_antialias(r, picture);
 }
 

@@ -46,6 +46,15 @@ typedef struct es_lamp_light {
     es_planes irradiance, specular, filtered_irradiance, filtered_specular;
 } es_lamp_light;
 
+/* What bias compensation in screen space gathers from, and what it found (gi/screen/residual_pass.h). */
+typedef struct es_residual_buffers {
+    es_residual_pyramid pyramid;
+    es_planes sent;            /* direct and bounded indirect light */
+    es_planes sparse_irradiance, sparse_specular;
+    es_planes irradiance, specular;
+    es_planes steps[ES_RESIDUAL_STEPS]; /* reflected radiance */
+} es_residual_buffers;
+
 struct es_renderer {
     es_context* context;
     es_renderer_settings settings;
@@ -90,6 +99,7 @@ struct es_renderer {
     es_gbuffer half;           /* with half_resolution: what the indirect light is shaded and filtered on, and its planes */
     es_planes upsampled_irradiance, upsampled_specular;
     es_planes compensation;    /* of the lights' bias: reflected radiance, of either sign */
+    es_residual_buffers residual;
     bool has_specular;
     uint32_t filter_passes;    /* that this frame's indirect light went through */
     es_history history;

@@ -1,5 +1,6 @@
 /* The renderer's settings: names, ranges, defaults. What a number means and where it comes from stands in gi.h. */
 #include "gi/gi.h"
+#include "gi/screen/residual.h"
 #include "platform/settings.h"
 
 #define AT(field) offsetof(es_renderer_settings, field)
@@ -78,6 +79,12 @@ static const es_setting renderer_table[] = {
     {"lamps.vpls", ES_SETTING_INT, "256", 0, 16384, NULL, "virtual point lights of the first bounce of lamps' light", AT(lamp_vpls)},
     {"lamps.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "lobes sharper than this are widened to it, or each of a lamp's lights would show as a spot", AT(lamp_roughness)},
     {"lamps.slope-bias", ES_SETTING_FLOAT, "0.016", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(lamp_slope_bias)},
+
+    {"compensation.steps", ES_SETTING_INT, "0", 0, ES_RESIDUAL_STEPS, NULL, "what vpl.bound takes from lights is found in screen space, so many bounces of it, and vpl.spread does not apply; 0: not", AT(compensation_steps)},
+    {"compensation.levels", ES_SETTING_INT, "6", 1, ES_RESIDUAL_LEVELS, NULL, "levels of the pyramid of pixels: fewer take more samples", AT(compensation_levels)},
+    {"compensation.solid-angle", ES_SETTING_FLOAT, "0.08", 0, 100, NULL, "projected solid angle above which a node of the pyramid is opened, sr", AT(compensation_solid_angle)},
+    {"compensation.discontinuity", ES_SETTING_FLOAT, "0.04", 0, 100, NULL, "the same where it spans an edge", AT(compensation_discontinuity)},
+    {"compensation.spacing", ES_SETTING_INT, "2", 1, 4, NULL, "found at every pixel, or every 2nd or 4th in each dimension: 1, 2 or 4", AT(compensation_spacing)},
 
     {"interleave", ES_SETTING_INT, "8", 1, 16, NULL, "n of the n × n interleaved pattern", AT(interleave)},
     {"filter.passes", ES_SETTING_INT, "2", 0, 4, NULL, "geometry-aware n × n box filters one after another: 0 none, 2 a smooth tent; n is interleave, with gi micro micro.filter", AT(filter_passes)},

@@ -91,6 +91,7 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y)
     rgb_v indirect = reflected(job->irradiance, job->specular, job->specular[0] && (!job->lit || job->lit[chunk] & 1), albedo, diffuse, at);
     indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
     store_rgb(job->bounded, at, indirect);
+    store_rgb(job->reflected, at, sum(direct, indirect));
     for (int i = 0; i < ES_FURTHER_LIGHTS; i++)
         if (job->further[i][0]) indirect = sum(indirect, load_rgb(job->further[i], at));
     store_rgb(job->indirect, at, indirect);

@@ -4,6 +4,7 @@
 #include "gi/indirect.h"
 #include "gi/lamp_passes.h"
 #include "gi/screen/directional_occlusion.h"
+#include "gi/screen/residual_pass.h"
 #include "gi/screen/screen_bounce.h"
 
 void es_screen_free_drawn(es_context* context, es_screen_buffers* b)
@@ -217,7 +218,7 @@ es_result es_pass_screen_bounce(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const bool lit = plan->valid[ES_PASS_DIRECT] || plan->valid[ES_PASS_LAMP_LIGHT] || plan->valid[ES_PASS_SCREEN_OCCLUSION];
-    const char* why = !s->screen_bounce ? "screen.bounce is off" : s->method == ES_GI_MICRO ? "gi is micro: it bounds nothing" : s->method != ES_GI_NONE && (s->traced_bias != ES_TRACED_BOUNDED || s->near_distance > 0.0f) ? "what is near is found by rays" : !in->has_geometry ? "nothing to light" : !lit ? plan->stats[ES_PASS_DIRECT].skipped : NULL;
+    const char* why = !s->screen_bounce ? "screen.bounce is off" : s->method == ES_GI_MICRO ? "gi is micro: it bounds nothing" : s->method != ES_GI_NONE && (s->traced_bias != ES_TRACED_BOUNDED || s->near_distance > 0.0f) ? "what is near is found by rays" : !es_residual_nothing(s) ? "compensation.steps finds it" : !in->has_geometry ? "nothing to light" : !lit ? plan->stats[ES_PASS_DIRECT].skipped : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_SCREEN_BOUNCE, why);
         return ES_OK;
