@@ -12,7 +12,7 @@ static const char usage[] =
     "             --size WxH --frames A:B (B not included; default 0:1) --fps N (30) --threads N (all)\n"
     "             --isa scalar|sse4|avx2|avx512|neon    instruction set to use; the result is the same\n"
     "             --no-skip                             do all work again in every frame; the result is the same\n"
-    "             --gi none|ism|classic|vpl-traced|vpl-sampled|micro  direct light only, imperfect shadow maps, accurate ones (slow),\n"
+    "             --gi none|ism|classic|vpl-traced|vpl-sampled|micro|second-order  direct light only, imperfect shadow maps, accurate ones (slow),\n"
     "                                                   rays to every light (slower) or to one a pixel, micro-buffers\n"
     "             --set key=value …                     any setting\n"
     "             --image NAME                          which image (default: display)\n"

@@ -25,7 +25,7 @@ bool demo_parse_double(const char* text, double minimum, double maximum, double*
     return true;
 }
 
-static const char* const method_names[] = {"none", "ism", "classic", "vpl-traced", "vpl-sampled", "micro"};
+static const char* const method_names[] = {"none", "ism", "classic", "vpl-traced", "vpl-sampled", "micro", "second-order"};
 enum { METHODS = sizeof method_names / sizeof method_names[0] };
 
 const char* demo_method_name(uint32_t method) { return method < METHODS ? method_names[method] : "?"; }
@@ -81,7 +81,7 @@ static int parse_method(const char* text, demo_options* options)
             options->method = i;
             return DEMO_OK;
         }
-    return demo_refuse("--gi %s: none, ism, classic, vpl-traced, vpl-sampled or micro is expected", text);
+    return demo_refuse("--gi %s: none, ism, classic, vpl-traced, vpl-sampled, micro or second-order is expected", text);
 }
 
 enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, RECORD, REPLAY, ENVIRONMENT, ROTATION, INTENSITY, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };

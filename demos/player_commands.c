@@ -118,7 +118,7 @@ static void do_darker(player* p) { set_exposure(p, p->session.settings.exposure 
 static void do_method(player* p)
 {
     es_renderer_settings settings = p->session.settings;
-    settings.method = settings.method < ES_GI_CLASSIC ? settings.method + 1 : settings.method == ES_GI_MICRO ? ES_GI_NONE : ES_GI_MICRO;
+    settings.method = settings.method < ES_GI_CLASSIC ? settings.method + 1 : settings.method == ES_GI_SECOND_ORDER ? ES_GI_NONE : settings.method == ES_GI_MICRO ? ES_GI_SECOND_ORDER : ES_GI_MICRO;
     player_configure(p, &settings);
 }
 

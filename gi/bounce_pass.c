@@ -13,11 +13,11 @@
 enum { POINT_SUBSETS = 128 };
 
 /* Those that virtual point lights make: all, or all but the last, which micro-buffers gather. */
-static uint32_t bounces_of(const es_renderer_settings* s) { return s->method == ES_GI_MICRO ? es_micro_vpl_bounces(s) : s->bounces; }
+static uint32_t bounces_of(const es_renderer_settings* s) { return s->method == ES_GI_MICRO ? es_micro_vpl_bounces(s) : s->method == ES_GI_SECOND_ORDER ? s->bounces > 0 : s->bounces; }
 
 static uint32_t further_vpls(const es_renderer_settings* s) { return bounces_of(s) > 1 ? (bounces_of(s) - 1) * s->bounce_vpls : 0; }
 
-uint32_t es_bounce_capacity(const es_renderer_settings* s) { return s->vpls + (s->lamps != ES_LAMPS_NONE ? s->lamp_vpls : 0) + further_vpls(s); }
+uint32_t es_bounce_capacity(const es_renderer_settings* s) { return (s->method == ES_GI_SECOND_ORDER ? s->second_lights : s->vpls) + (s->lamps != ES_LAMPS_NONE ? s->lamp_vpls : 0) + further_vpls(s); }
 
 uint32_t es_bounce_room(const es_renderer* r) { return r->first_vpls + further_vpls(&r->settings); }
 
@@ -191,13 +191,14 @@ es_result es_pass_bounces(es_renderer* r, const es_frame_inputs* in)
 static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* result)
 {
     es_result outcome = es_planes_resize(r->context, result, &r->gbuffer);
-    if (outcome || !bounces || !r->plan.valid[ES_PASS_SHADING]) return outcome;
+    const bool open = r->plan.valid[ES_PASS_SECOND_ORDER]; /* one bounce, which is all */
+    if (outcome || !bounces || !(open || r->plan.valid[ES_PASS_SHADING])) return outcome;
     es_compose_job job = es_renderer_compose_job(r);
     es_indirect_planes shaded, whole, filtered;
     memset(&shaded, 0, sizeof shaded);
     memset(&whole, 0, sizeof whole);
     memset(&filtered, 0, sizeof filtered);
-    if (bounces < r->stats.bounce_count || r->plan.valid[ES_PASS_TEMPORAL]) {
+    if (!open && (bounces < r->stats.bounce_count || r->plan.valid[ES_PASS_TEMPORAL])) {
         outcome = es_indirect_shade(r, es_bounce_end(r, bounces), &shaded.irradiance, &shaded.specular);
         if (!outcome && r->filter_passes) outcome = es_indirect_filter(r, &shaded.irradiance, &shaded.specular, &filtered.irradiance, &filtered.specular);
         const es_indirect_planes* last = r->filter_passes ? &filtered : &shaded;

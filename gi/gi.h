@@ -20,7 +20,9 @@ typedef enum es_gi_method {
     ES_GI_CLASSIC,  /* the same lights, an accurate shadow map each: the thesis' own reference; slow */
     ES_GI_VPL_TRACED, /* the same lights, visibility by rays, every light at every pixel unless traced_interleave: a judge; slower */
     ES_GI_VPL_SAMPLED, /* the same lights, interleaved; of its share of them each pixel chooses one by what it would send and tests it by a ray */
-    ES_GI_MICRO     /* without such lights, but for further bounces where asked for: at every pixel, or one of 4 or 16, light is gathered from a micro-buffer drawn of a hierarchy of points (Ritschel thesis §6) */
+    ES_GI_MICRO,    /* without such lights, but for further bounces where asked for: at every pixel, or one of 4 or 16, light is gathered from a micro-buffer drawn of a hierarchy of points (Ritschel thesis §6) */
+    ES_GI_SECOND_ORDER /* lights that nothing shadows, and negative lights for what would not have arrived, all in image space (Cochran and Steele 2007): fast, one matt bounce,
+                        * and it leaks: only what the camera sees takes light away, at places that do not depend on what hides what */
 } es_gi_method;
 
 /* What the methods with virtual point lights make of the approximations of a pair's light: geometry_bound, spread and lobe_roughness. */
@@ -188,6 +190,10 @@ typedef struct es_renderer_settings {
     uint32_t lamp_vpls;              /* virtual point lights that the first bounce of their light makes; with every method that has such lights */
     float lamp_roughness;            /* lobes sharper than this GGX roughness are widened to it under lamps */
     float lamp_slope_bias;           /* of their maps, as ism_slope_bias */
+    /* second-order illumination: SECOND_ORDER. geometry_bound and spread apply, seed shifts the sequences; what is above on virtual point lights does not besides */
+    uint32_t second_lights;          /* lights (table 1: 300) */
+    uint32_t second_negative;        /* negative ones (150) */
+    float second_threshold;          /* gi/second_order.h: pixels whose neighbours at half the resolution differ by more are lit at their own */
     /* bias compensation in screen space (Novák et al. 2011), with the methods that have virtual point lights: what geometry_bound takes from their light is found
      * again among the pixels; spread does not apply then, and with near_distance or another traced_bias than BOUNDED there is nothing to be found */
     uint32_t compensation_steps;     /* 0: none; … ES_MAX_COMPENSATION_STEPS: times that the residual operator is applied */

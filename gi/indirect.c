@@ -35,12 +35,13 @@ bool es_frame_has_lobes(const es_renderer* renderer, const es_draw_list* list)
     return es_surfaces_have_lobes(list);
 }
 
-bool es_indirect_is_there(const es_renderer* r) { return r->plan.valid[ES_PASS_SHADING] || r->plan.valid[ES_PASS_MICRO]; }
+bool es_indirect_is_there(const es_renderer* r) { return r->plan.valid[ES_PASS_SHADING] || r->plan.valid[ES_PASS_MICRO] || r->plan.valid[ES_PASS_SECOND_ORDER]; }
 
 void es_indirect_reads(es_plan* plan)
 {
     es_plan_reads_pass(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_MICRO);
+    es_plan_reads_pass(plan, ES_PASS_SECOND_ORDER);
     es_plan_reads_pass(plan, ES_PASS_MICRO_UPSAMPLE);
 }
 
@@ -49,7 +50,7 @@ const char* es_indirect_nothing(const es_renderer* r, const es_frame_inputs* in)
     return in->no_indirect ? in->no_indirect : r->settings.method != ES_GI_MICRO && !r->vpl_count ? "the lights reach nothing" : NULL;
 }
 
-bool es_indirect_is_halved(const es_renderer_settings* s) { return s->half_resolution && s->method != ES_GI_MICRO; }
+bool es_indirect_is_halved(const es_renderer_settings* s) { return s->half_resolution && s->method != ES_GI_MICRO && s->method != ES_GI_SECOND_ORDER; }
 
 /* What the indirect light is shaded and filtered on. */
 const es_gbuffer* es_indirect_gbuffer(const es_renderer* r) { return es_indirect_is_halved(&r->frame.settings) ? &r->half : &r->gbuffer; }
@@ -112,6 +113,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     const es_renderer_settings* s = &r->settings;
     const char* why = es_indirect_nothing(r, in);
     if (!why && s->method == ES_GI_MICRO) why = "gi is micro";
+    if (!why && s->method == ES_GI_SECOND_ORDER) why = "gi is second-order";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_SHADING, why);
         return ES_OK;
@@ -175,7 +177,7 @@ es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const char* nothing = es_indirect_nothing(r, in);
-    const char* why = nothing ? nothing : s->method == ES_GI_MICRO && s->micro_spacing > 1 ? "micro.spacing is above 1: interpolation is smooth" : s->method == ES_GI_MICRO && s->micro_filter == 1 ? "micro.filter is 1" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->method != ES_GI_MICRO && s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
+    const char* why = nothing ? nothing : s->method == ES_GI_SECOND_ORDER ? "gi is second-order: every pixel has every light" : s->method == ES_GI_MICRO && s->micro_spacing > 1 ? "micro.spacing is above 1: interpolation is smooth" : s->method == ES_GI_MICRO && s->micro_filter == 1 ? "micro.filter is 1" : !s->filter_passes ? "filter.passes is 0" : every_light(s) ? "gi is vpl-traced: every pixel has every light" : s->method != ES_GI_MICRO && s->interleave == 1 ? "interleave is 1: nothing to smooth" : NULL;
     r->filter_passes = why ? 0 : s->filter_passes;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_FILTER, why);
@@ -234,7 +236,7 @@ es_result es_pass_upsample(es_renderer* r, const es_frame_inputs* in)
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
     const char* nothing = es_indirect_nothing(r, in);
-    const char* why = nothing ? nothing : s->method == ES_GI_MICRO ? "gi is micro: micro.spacing takes its place" : !s->half_resolution ? "half-resolution is off" : NULL;
+    const char* why = nothing ? nothing : s->method == ES_GI_SECOND_ORDER ? "gi is second-order: second.threshold takes its place" : s->method == ES_GI_MICRO ? "gi is micro: micro.spacing takes its place" : !s->half_resolution ? "half-resolution is off" : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_UPSAMPLE, why);
         return ES_OK;

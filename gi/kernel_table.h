@@ -22,6 +22,7 @@
 #include "gi/screen/directional_occlusion.h"
 #include "gi/screen/residual.h"
 #include "gi/screen/screen_bounce.h"
+#include "gi/second_order.h"
 #include "gi/shade.h"
 #include "gi/temporal.h"
 #include "gi/view_importance.h"
@@ -37,6 +38,9 @@
     /* gi/screen/residual.h: rows of the level, of the result */                                                 \
     X(residual_level, (const es_residual_layer* layer, uint32_t level, uint32_t row_begin, uint32_t row_end))    \
     X(residual_gather, (const es_residual_job* job, uint32_t row_begin, uint32_t row_end))                       \
+    /* gi/second_order.h: rows */                                                                                \
+    X(open_shade, (const es_open_job* job, uint32_t row_begin, uint32_t row_end))                                \
+    X(open_upsample, (const es_open_upsample_job* job, uint32_t row_begin, uint32_t row_end))                    \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
     X(light_points, (const es_point_light_job* job, const es_point_forest* forest, const es_leaf_range* range))  \
     X(push_points, (const es_point_push* push, const es_point_forest* forest, const es_push_range* range)) \

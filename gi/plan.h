@@ -29,6 +29,7 @@
     X(LAMP_LIGHT, "light of lamps", "samples")                                                                   \
     X(LAMP_FILTER, "filter of lamps' light", "pixels")                                                           \
     X(SHADING, "shading", "samples")                                                                             \
+    X(SECOND_ORDER, "second-order light", "pixels at full resolution")                                           \
     X(MICRO, "micro-buffers", "samples")                                                                         \
     X(MICRO_UPSAMPLE, "micro-buffer upsampling", "pixels gathered afresh")                                       \
     X(COMPENSATION, "bias compensation", "samples")                                                              \

@@ -13,6 +13,7 @@
 #include "gi/passes.h"
 #include "gi/screen/passes.h"
 #include "gi/screen/residual_pass.h"
+#include "gi/second_order_pass.h"
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -108,6 +109,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->specular);
     es_planes_free(context, &renderer->compensation);
     es_residual_buffers_free(context, &renderer->residual);
+    es_second_order_free(context, &renderer->second_order);
     es_history_free(context, &renderer->history);
     es_micro_free_planes(context, &renderer->micro);
     es_lamps_free_planes(context, &renderer->lamps);
@@ -289,6 +291,27 @@ static uint64_t scene_hash(const es_frame_inputs* in)
     return es_hash_bytes(hash, in->lights, in->light_count * sizeof *in->lights);
 }
 
+/* As Cochran and Steele place them: no camera and no brightness has a say in it. */
+static es_result pass_open_lights(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    es_plan_begin(plan, ES_PASS_VPLS);
+    es_plan_reads_pass(plan, ES_PASS_LIGHT_VIEWS);
+    es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
+    const uint32_t words[] = {s->method, s->second_lights, s->seed, es_bounce_capacity(s)};
+    es_plan_reads(plan, words, sizeof words);
+    if (!es_plan_run(plan, ES_PASS_VPLS)) return ES_OK;
+    es_stable_vpls_free(r->context, &r->stable);
+    es_result result = es_reserve_vpls(r, es_bounce_capacity(s));
+    /* what the image of it shows */
+    for (uint32_t i = 0; i < r->light_count && !result; i++) result = es_importance_build(r->context, &r->importances[i], &r->light_views[i], NULL);
+    if (!result) result = es_open_lights_place(r->context, r->light_views, r->light_count, s->second_lights, s->seed, r->vpls, &r->punctual_vpls);
+    r->first_vpls = r->punctual_vpls;
+    if (!result) es_plan_done(plan, ES_PASS_VPLS, r->first_vpls);
+    return result;
+}
+
 static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_world* world, uint32_t picture)
 {
     es_plan* plan = &r->plan;
@@ -298,6 +321,7 @@ static es_result pass_vpls(es_renderer* r, const es_frame_inputs* in, const es_w
         return ES_OK;
     }
     r->first_vpls = r->punctual_vpls;
+    if (r->settings.method == ES_GI_SECOND_ORDER) return pass_open_lights(r, in);
     /* an update of stable lights is a step in time: all pictures of a frame have the first one's, whether work is skipped or not */
     if (picture && r->settings.stable_vpls && plan->valid[ES_PASS_VPLS]) {
         plan->stats[ES_PASS_VPLS].skipped = "the lights are those of the frame's first picture";
@@ -475,6 +499,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (es_indirect_is_there(r) && r->has_specular) job.specular[k] = specular->at[k];
         if (r->plan.valid[ES_PASS_COMPENSATION]) job.further[ES_FURTHER_RAYS][k] = r->compensation.at[k];
         if (r->plan.valid[ES_PASS_SCREEN_BOUNCE]) job.further[ES_FURTHER_BOUNCE][k] = r->screen.bounce.at[k];
+        if (r->plan.valid[ES_PASS_SECOND_ORDER]) job.further[ES_FURTHER_NEGATIVE][k] = r->second_order.negative.at[k];
         for (uint32_t i = 0; i < es_residual_steps(r); i++) job.further[ES_FURTHER_RESIDUAL + i][k] = r->residual.steps[i].at[k];
         if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
@@ -498,6 +523,7 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_COMPENSATION);
     es_screen_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_RESIDUAL);
+    es_plan_reads_pass(plan, ES_PASS_SECOND_ORDER);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -531,6 +557,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = pass_direct(r, in);
     if (!result) result = es_pass_lamp_light(r, in);
     if (!result) result = es_pass_shading(r, in);
+    if (!result) result = es_pass_second_order(r, in);
     if (!result) result = es_pass_micro(r, in);
     if (!result) result = es_pass_compensation(r, in);
     const bool first = r->settings.temporal_stage == ES_TEMPORAL_BEFORE_FILTER;
@@ -544,11 +571,13 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     return result ? result : es_pass_antialias(r, picture);
 }
 
+static uint32_t vpls_of(const es_renderer_settings* s) { return s->method == ES_GI_SECOND_ORDER ? s->second_lights : s->vpls; }
+
 static void why_no_light(const es_renderer_settings* s, es_frame_inputs* in)
 {
     in->may_have_lamps = s->lamps != ES_LAMPS_NONE && (in->has_environment || es_something_glows(in->list));
     const bool of_lamps = in->may_have_lamps && s->lamp_vpls;
-    in->no_indirect = s->bounces == 0 ? "bounces is 0" : !s->vpls && !of_lamps ? "vpl.count is 0" : !in->light_count && !of_lamps ? "no light is on" : !in->has_geometry ? "nothing to light" : NULL;
+    in->no_indirect = s->bounces == 0 ? "bounces is 0" : !vpls_of(s) && !of_lamps ? s->method == ES_GI_SECOND_ORDER ? "second.lights is 0" : "vpl.count is 0" : !in->light_count && !of_lamps ? "no light is on" : !in->has_geometry ? "nothing to light" : NULL;
     in->no_vpls = in->no_indirect;
     if (s->method == ES_GI_NONE) in->no_indirect = in->no_vpls = "gi is none";
     if (s->method != ES_GI_MICRO) return;

@@ -15,6 +15,7 @@
 #include "gi/plan.h"
 #include "gi/reference/scene.h"
 #include "gi/scene_points.h"
+#include "gi/second_order.h"
 #include "gi/screen/buffers.h"
 #include "gi/shade.h"
 #include "gi/stable_vpls.h"
@@ -45,6 +46,14 @@ typedef struct es_lamp_light {
     bool filtered;
     es_planes irradiance, specular, filtered_irradiance, filtered_specular;
 } es_lamp_light;
+
+/* Second-order illumination (gi/second_order_pass.h): at half the resolution; what negative lights take, as irradiance and reflected, both not above 0. */
+typedef struct es_second_order_buffers {
+    es_gbuffer half;
+    es_planes half_positive, half_negative;
+    es_planes taken, negative;
+    uint32_t negative_count;   /* lights of this frame */
+} es_second_order_buffers;
 
 /* What bias compensation in screen space gathers from, and what it found (gi/screen/residual_pass.h). */
 typedef struct es_residual_buffers {
@@ -100,6 +109,7 @@ struct es_renderer {
     es_planes upsampled_irradiance, upsampled_specular;
     es_planes compensation;    /* of the lights' bias: reflected radiance, of either sign */
     es_residual_buffers residual;
+    es_second_order_buffers second_order;
     bool has_specular;
     uint32_t filter_passes;    /* that this frame's indirect light went through */
     es_history history;

@@ -8,8 +8,8 @@
 static const es_setting renderer_table[] = {
     {"width", ES_SETTING_INT, "1024", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(width)},
     {"height", ES_SETTING_INT, "768", 1, ES_RASTER_MAX_SIZE, NULL, "pixels", AT(height)},
-    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic|vpl-traced|vpl-sampled|micro",
-        "indirect light: none, imperfect shadow maps, an accurate map per light, rays to every light, or to one a pixel; micro-buffers", AT(method)},
+    {"gi", ES_SETTING_CHOICE, "ism", 0, 0, "none|ism|classic|vpl-traced|vpl-sampled|micro|second-order",
+        "indirect light: none, imperfect shadow maps, an accurate map per light, rays to every light, or to one a pixel; micro-buffers; second-order: lights without shadows and negative ones, which leaks light and sees no lobes", AT(method)},
     {"skip", ES_SETTING_BOOL, "true", 0, 1, NULL, "skip work whose result would be the same bits", AT(skip)},
     {"bounces", ES_SETTING_INT, "1", 0, ES_MAX_BOUNCES, NULL, "indirect bounces", AT(bounces)},
     {"bounce.method", ES_SETTING_CHOICE, "one-pass", 0, 0, "one-pass|reflective", "lights of bounces after the first: on points seen by shadow maps, or on texels of reflective maps", AT(bounce_method)},
@@ -79,6 +79,10 @@ static const es_setting renderer_table[] = {
     {"lamps.vpls", ES_SETTING_INT, "256", 0, 16384, NULL, "virtual point lights of the first bounce of lamps' light", AT(lamp_vpls)},
     {"lamps.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "lobes sharper than this are widened to it, or each of a lamp's lights would show as a spot", AT(lamp_roughness)},
     {"lamps.slope-bias", ES_SETTING_FLOAT, "0.016", 0, 1, NULL, "depth bias over the cosine at the pixel, share of the scene's extent; about a splat's width", AT(lamp_slope_bias)},
+
+    {"second.lights", ES_SETTING_INT, "300", 0, 16384, NULL, "gi second-order: lights, none of which is shadowed", AT(second_lights)},
+    {"second.negative", ES_SETTING_INT, "150", 0, 16384, NULL, "gi second-order: negative lights behind what the camera sees turned away from lights", AT(second_negative)},
+    {"second.threshold", ES_SETTING_FLOAT, "0.02", 0, 1000, NULL, "gi second-order: how far normals and planes differ where half the resolution will not do", AT(second_threshold)},
 
     {"compensation.steps", ES_SETTING_INT, "0", 0, ES_RESIDUAL_STEPS, NULL, "what vpl.bound takes from lights is found in screen space, so many bounces of it, and vpl.spread does not apply; 0: not", AT(compensation_steps)},
     {"compensation.levels", ES_SETTING_INT, "6", 1, ES_RESIDUAL_LEVELS, NULL, "levels of the pyramid of pixels: fewer take more samples", AT(compensation_levels)},

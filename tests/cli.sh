@@ -163,7 +163,7 @@ refused '--fps nan' render cornell --hash --fps nan
 refused '--threads 0' render cornell --hash --threads 0
 refused '--threads 65' render cornell --hash --threads 65
 refused 'scalar, sse4, avx2, avx512 or neon' render cornell --hash --isa mmx
-refused 'none, ism, classic, vpl-traced, vpl-sampled or micro' render cornell --hash --gi photons
+refused 'none, ism, classic, vpl-traced, vpl-sampled, micro or second-order' render cornell --hash --gi photons
 refused 'key=value' render cornell --hash --set exposure
 refused 'did you mean exposure' render cornell --hash --set exposuer=1
 refused 'did you mean world.triangles' render cornell --hash --set triangels=1

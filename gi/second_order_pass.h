@@ -1,0 +1,10 @@
+/* The pass of second-order illumination (gi/second_order.h). */
+#ifndef EARTHSHINE_GI_SECOND_ORDER_PASS_H
+#define EARTHSHINE_GI_SECOND_ORDER_PASS_H
+
+#include "gi/renderer.h"
+
+es_result es_pass_second_order(es_renderer* renderer, const es_frame_inputs* in);
+void es_second_order_free(es_context* context, es_second_order_buffers* buffers);
+
+#endif
