@@ -55,9 +55,9 @@ static es_result light(es_renderer* r, const es_frame_inputs* in, uint64_t* whol
     es_open_light* negative = es_arena_allocate(&r->arena, ((size_t)s->second_negative + 1) * sizeof *negative);
     uint8_t* listed = es_arena_allocate(&r->arena, list_bytes);
     if (!positive || !tries || !negative || !listed) return es_context_last_result(r->context);
-    for (uint32_t i = 0; i < r->vpl_count; i++) positive[i] = es_open_light_of(&r->vpls[i], s->spread);
-    const float bound = es_geometry_bound(s, in);
-    const es_negative_job place = {.gbuffer = g, .rays = r->rays, .lights = positive, .light_count = r->vpl_count, .count = s->second_negative, .seed = s->seed, .bound = bound, .spread = s->spread};
+    const float bound = es_geometry_bound(s, in), spread = es_vpl_spread(s);
+    for (uint32_t i = 0; i < r->vpl_count; i++) positive[i] = es_open_light_of(&r->vpls[i], spread);
+    const es_negative_job place = {.gbuffer = g, .rays = r->rays, .lights = positive, .light_count = r->vpl_count, .count = s->second_negative, .seed = s->seed, .bound = bound, .spread = spread};
     b->negative_count = 0;
     if (s->second_negative) es_negative_lights_place(r->context, &place, tries, negative, &b->negative_count);
 
@@ -108,7 +108,7 @@ es_result es_pass_second_order(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_LAMP_BOUNCE);
     const uint32_t words[] = {r->vpl_count, s->second_negative, s->seed};
     es_plan_reads(plan, words, sizeof words);
-    const float numbers[] = {es_geometry_bound(s, in), s->spread, s->second_threshold};
+    const float numbers[] = {es_geometry_bound(s, in), es_vpl_spread(s), s->second_threshold};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_SECOND_ORDER)) return ES_OK;
     uint64_t whole = 0;
