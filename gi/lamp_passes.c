@@ -107,6 +107,8 @@ static es_result shade(es_renderer* r, const es_frame_inputs* in)
     job.vpls = lamps->set.shaded;
     job.vpl_count = shaded_count(r);
     job.map_of = lamps->set.map_of;
+    if (lamps->has_specular && !r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
+    job.wide = &r->micro.lobes;
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = lamps->irradiance.at[k];
         job.specular[k] = lamps->has_specular ? lamps->specular.at[k] : NULL;
@@ -167,7 +169,7 @@ static es_result pass_filter(es_renderer* r, const char* nothing)
     return result;
 }
 
-/* Direct light is that of the surface model, so a lobe counts however wide it is: its Fresnel term takes what it reflects from the diffuse part,
+/* Direct light is that of the surface model, so a lobe counts however wide it is (es_shade_job.wide): its Fresnel term takes what it reflects from the diffuse part,
  * a quarter where a floor is seen at a slant. */
 static bool anything_specular(const es_draw_list* list)
 {

@@ -30,6 +30,7 @@
 #ifndef EARTHSHINE_GI_SHADE_H
 #define EARTHSHINE_GI_SHADE_H
 
+#include "gi/micro/lobe_albedo.h"
 #include "gi/pixel_rays.h"
 #include "gi/screen/view_stack.h"
 #include "gi/surface.h"
@@ -76,6 +77,9 @@ typedef struct es_shade_job {
     float spread;
     float geometry_bound;          /* 1/m² */
     float lobe_roughness;          /* lobes of lights and pixels are at least as wide as GGX of this roughness */
+    /* with specular: eights of pixels of which none has a lobe worth evaluating (es_surface_has_lobe), all of them wide, reflect the irradiance as if it came evenly
+     * from the hemisphere: by their directional albedo, seen from the eye, and the interface's means. NULL: every lobe is evaluated */
+    const es_lobe_albedo* wide;
     uint32_t interleave;           /* n, 1 … ES_INTERLEAVE_MAX */
     bool sampled;                  /* with visibility: one light of its phase for each pixel */
     const es_shade_near* near;     /* NULL: none */
@@ -134,6 +138,7 @@ struct es_shade_batch {
     float f0[3][ES_SHADE_LANES], roughness[ES_SHADE_LANES];
     int32_t model[ES_SHADE_LANES];
     uint8_t lobed[ES_SHADE_LANES / 8];  /* per vector: does a pixel of it have a lobe? */
+    uint8_t wide[ES_SHADE_LANES / 8];   /* per vector: have they es_shade_job.wide's? Then they are no lobed ones until all lights are added */
     float s[3][ES_SHADE_LANES];
     /* with es_shade_visibility or es_shade_near */
     float ox[ES_SHADE_LANES], oy[ES_SHADE_LANES], oz[ES_SHADE_LANES]; /* where rays begin */

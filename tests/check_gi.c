@@ -130,6 +130,9 @@ static void check_shade(void** state)
         for (uint32_t v = 0; v < count; v++) map_of[v] = random_bits() % count;
         es_shade_job job = {.gbuffer = &g, .rays = random_rays(trial % 5 == 1, width, height), .vpl_count = count, .maps = shadowed ? maps : NULL, .map_of = trial % 7 ? NULL : map_of, .map_size = size,
             .far_distance = 6, .bias = 0.05f, .geometry_bound = uniform(0.1f, 50), .interleave = 1 + trial % 16};
+        static es_lobe_albedo table;
+        for (uint32_t i = 0; i < sizeof table.low / sizeof *table.low; i++) table.low[i] = uniform(0, 1), table.high[i] = uniform(0, 1), table.phong[i] = uniform(0, 1);
+        job.wide = trial % 6 < 3 ? &table : NULL;
         plane expected[6], result[6];
         for (int k = 0; k < 6; k++) {
             expected[k] = new_plane((size_t)g.stride * height);

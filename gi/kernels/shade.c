@@ -8,6 +8,7 @@
 #include <stddef.h>
 
 #include "gi/kernel_table.h"
+#include "gi/kernels/lobe_albedo_simd.h"
 #include "gi/kernels/phases_simd.h"
 #include "gi/kernels/screen_test_simd.h"
 #include "gi/kernels/surface_simd.h"
@@ -104,6 +105,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 vf_store(batch->direction[0] + at, spread_number(job, index, 0x85ebca6bu, 2882110345u));
                 vf_store(batch->direction[1] + at, spread_number(job, index, 0xc2b2ae35u, 2360945575u));
             }
+            batch->wide[at / VW] = false;
             if (!with_lobes) continue;
             if (vm_all(~seen | es_surface_word_is_diffuse_v(word))) {
                 batch->lobed[at / VW] = false; /* nor is anything read of what follows, but these */
@@ -125,6 +127,8 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 vf_store(batch->f0[k] + at, surface.specular[k]);
                 vf_store(batch->s[k] + at, zero);
             }
+            batch->wide[at / VW] = job->wide && vm_any(lobed) && !vm_any(lobed & es_surface_has_lobe_v(&surface));
+            if (batch->wide[at / VW]) lobed = vi_zero();
             lobes |= lobed;
             batch->lobed[at / VW] = vm_any(lobed);
             vm phong = vi_eq(surface.model, vi_set1(ES_SURFACE_PHONG));
@@ -508,6 +512,29 @@ static void scatter_lobes(const es_shade_job* job, const lanes_of_phase* p, cons
     }
 }
 
+/* What wide lobes make of the irradiance that has come. */
+static void reflect_wide(const es_shade_job* job, es_shade_batch* batch, uint32_t lanes)
+{
+    const vf zero = vf_zero(), one = vf_set1(1.0f), inverse_pi = vf_set1(0.318309886f);
+    for (uint32_t i = 0; i < lanes; i += VW) {
+        if (!batch->wide[i / VW]) continue;
+        es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
+            .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
+        const vf cosine = vf_clamp(vf_load(batch->vx + i) * vf_load(batch->nx + i) + vf_load(batch->vy + i) * vf_load(batch->ny + i) + vf_load(batch->vz + i) * vf_load(batch->nz + i), zero, one);
+        const vf f90 = vf_min(vf_set1(25.0f) * vf_max(surface.specular[0], vf_max(surface.specular[1], surface.specular[2])), one), m = one - cosine, m2 = m * m;
+        const vf through = (one - f90 * (vf_set1(0.04f) + vf_set1(0.96f) * (m2 * m2 * m))) * (one - f90 * vf_set1(0.04f + 0.96f / 21.0f));
+        const vf pass = vf_select(vi_eq(surface.model, vi_set1(ES_SURFACE_METALLIC_ROUGHNESS)), through, one);
+        vf albedo[3];
+        es_lobe_albedo_v(job->wide, &surface, cosine, albedo);
+        for (int k = 0; k < 3; k++) {
+            const vf e = vf_load(batch->e[k] + i);
+            vf_store(batch->s[k] + i, e * inverse_pi * albedo[k]);
+            vf_store(batch->e[k] + i, e * pass);
+        }
+        batch->lobed[i / VW] = true;
+    }
+}
+
 /* A phase without lights; whole_row: as are all of its row, which is not put together from phases. */
 static void darken(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool whole_row)
 {
@@ -557,6 +584,7 @@ static void shade_phase(const es_shade_job* job, const es_shade_light* lights, c
         if (lobes && !job->visibility && !light->glossy) apply_light(job, light, map, batch, lanes, shadow, false, true, PIXELS_WITH_LOBES);
     }
     if (job->near) job->near->add(job->near, batch, lanes, lobes);
+    if (job->wide && job->specular[0]) reflect_wide(job, batch, lanes);
     if (job->specular[0] && job->lit) scatter_lobes(job, p, batch);
     else if (job->specular[0]) scatter(job->gbuffer, p, n, batch->s, job->specular);
 }
