@@ -16,7 +16,7 @@ static void* allocate(void* user, size_t size, size_t alignment)
 
 static void release(void* user, void* pointer, size_t size) { free(pointer); }
 
-enum { METHODS = 14, IMAGES_MAX = 64 };
+enum { METHODS = 20, FIRST_OF_SCREEN = 14, IMAGES_MAX = 64 };
 
 static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
 {
@@ -37,7 +37,7 @@ static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
     assert_int_equal(es_world_step(s.world, 0), ES_OK);
     /* odd sizes leave padding in rows, and phases and blocks that are not full */
     for (uint32_t i = 0; i < METHODS; i++) {
-        es_renderer_settings settings = stress_settings(i == 8 ? 1 : 53, i == 8 ? 3 : 37, i < 4 ? i : i < 6 ? ES_GI_VPL_TRACED : i == 6 ? ES_GI_VPL_SAMPLED : i == 9 || i == 10 || i == 13 ? ES_GI_MICRO : ES_GI_ISM);
+        es_renderer_settings settings = stress_settings(i == 8 ? 1 : 53, i == 8 ? 3 : 37, i < 4 ? i : i < 6 ? ES_GI_VPL_TRACED : i == 6 ? ES_GI_VPL_SAMPLED : i == 9 || i == 10 || i == 13 ? ES_GI_MICRO : i == 15 ? ES_GI_SECOND_ORDER : i == 16 ? ES_GI_NONE : ES_GI_ISM);
         settings.vpls = 70;
         settings.interleave = 3;
         settings.traced_bias = i == 4 ? ES_TRACED_UNBOUNDED : i == 5 ? ES_TRACED_COMPENSATED : ES_TRACED_BOUNDED;
@@ -50,6 +50,20 @@ static void hashes_with(uint32_t word, uint64_t hashes[METHODS][IMAGES_MAX])
         settings.near_distance = i == 6 ? 0.1f : 0.0f;
         /* in half of them the set is of lamps and sky, by maps or rays */
         settings.lamps = i % 2 || i > 10 ? i == 12 ? ES_LAMPS_TRACED : ES_LAMPS_MAPS : ES_LAMPS_NONE;
+        if (i >= FIRST_OF_SCREEN) {
+            settings.lamps = i == 16 ? ES_LAMPS_SCREEN : i == 17 ? ES_LAMPS_AMBIENT : ES_LAMPS_MAPS;
+            settings.half_resolution = i == 17;
+            settings.compensation_steps = i == 14 ? 2 : i == 19 ? 1 : 0;
+            settings.compensation_spacing = i == 14 ? 2 : 1;
+            settings.compensation_levels = i == 14 ? 6 : 3;
+            settings.geometry_bound = 300.0f;
+            settings.screen_bounce = i == 16 || i == 17;
+            settings.screen_layers = i == 16 ? 4 : i == 18 ? 2 : 1;
+            settings.screen_cameras = i == 17 ? 4 : 0;
+            settings.screen_repair = i == 18 ? 4 : 0;
+            settings.second_lights = 30;
+            settings.second_negative = 11;
+        }
         settings.lamp_count = 37;
         settings.lamp_size = 32;
         settings.lamp_interleave = i == 11 ? 5 : 3;
