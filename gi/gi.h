@@ -195,7 +195,8 @@ typedef struct es_renderer_settings {
     uint32_t second_negative;        /* negative ones (150) */
     float second_threshold;          /* gi/second_order.h: pixels whose neighbours at half the resolution differ by more are lit at their own */
     /* bias compensation in screen space (Novák et al. 2011), with the methods that have virtual point lights: what geometry_bound takes from their light is found
-     * again among the pixels; spread does not apply then, and with near_distance or another traced_bias than BOUNDED there is nothing to be found */
+     * again among the pixels; spread does not apply then, and with near_distance or another traced_bias than BOUNDED there is nothing to be found. Of
+     * screen_layers behind the first the direct light is sent as well */
     uint32_t compensation_steps;     /* 0: none; … ES_MAX_COMPENSATION_STEPS: times that the residual operator is applied */
     uint32_t compensation_levels;    /* of the pyramid of pixels, 1 … 8 (§6: 6) */
     float compensation_solid_angle;  /* projected, sr, above which a node of it is opened (§4.2: 0.08) … */

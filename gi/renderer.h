@@ -57,7 +57,7 @@ typedef struct es_second_order_buffers {
 
 /* What bias compensation in screen space gathers from, and what it found (gi/screen/residual_pass.h). */
 typedef struct es_residual_buffers {
-    es_residual_pyramid pyramid;
+    es_residual_pyramid pyramids[ES_RESIDUAL_LAYERS]; /* of the picture, and of layers peeled from it */
     es_planes sent;            /* direct and bounded indirect light */
     es_planes sparse_irradiance, sparse_specular;
     es_planes irradiance, specular;

@@ -123,7 +123,7 @@ static bool try_pixel(const es_negative_job* job, uint32_t index, es_open_light*
     const size_t at = (size_t)y * g->stride + x;
     const vf depth = vf_set1(g->depth[at]);
     if (!(g->depth[at] > 0.0f)) return false;
-    const es_patch_v patch = es_patch_of_pixel_v(&job->rays, es_pixel_area(&job->rays), vf_set1((float)x), vf_set1((float)y), depth, vi_set1((int32_t)g->normal[at]), vm_gt(depth, vf_zero()));
+    const es_patch_v patch = es_patch_of_pixel_v(&job->rays, es_pixel_area(&job->rays), false, vf_set1((float)x), vf_set1((float)y), depth, vi_set1((int32_t)g->normal[at]), vm_gt(depth, vf_zero()));
     const es_vec3 p = es_v3(patch.x[0], patch.y[0], patch.z[0]), n = es_v3(patch.nx[0], patch.ny[0], patch.nz[0]);
     es_vec3 sum = es_v3(0, 0, 0), direction = es_v3(0, 0, 0);
     for (uint32_t i = 0; i < job->light_count; i++) {

@@ -207,6 +207,7 @@ static es_renderer_settings small_settings(void)
     s.classic_size = 32;
     s.traced_samples = 1;
     s.interleave = 2;
+    s.lamps = ES_LAMPS_NONE; /* but for a frame of them alone, and one of the sky's: each makes tables anew */
     s.lamp_count = 24;
     s.lamp_size = 32;
     s.lamp_vpls = 8;
@@ -703,6 +704,7 @@ enum { IN_TIME = 6, MICRO = IN_TIME + 2 };
 static es_result frame(bench* w, const operation* o, void** object)
 {
     es_renderer_settings settings = small_settings();
+    if (o->kind == ES_GI_NONE) settings.lamps = ES_LAMPS_MAPS;
     settings.method = (uint32_t)(o->kind < 4 ? o->kind : o->kind < IN_TIME ? ES_GI_VPL_TRACED : ES_GI_ISM);
     settings.traced_bias = (uint32_t)(o->kind < 4 || o->kind >= IN_TIME ? 0 : o->kind - 3);
     if (o->kind >= MICRO) {

@@ -111,12 +111,12 @@ static void load_node(const es_residual_layer* layer, float pixel_area, const pl
         if (rays->orthographic) {
             const float dx = column - (float)x, dy = row - (float)y;
             const es_vec3 shift = es_v3(dx * rays->base_dx[0] + dy * rays->base_dy[0], dx * rays->base_dx[1] + dy * rays->base_dy[1], dx * rays->base_dx[2] + dy * rays->base_dy[2]);
-            depth = depth - es_clampf(es_v3_dot(n, shift) / es_minf(along, -1e-3f), -0.5f * depth, 0.5f * depth);
+            depth = depth - es_clampf(es_v3_dot(n, shift) / (layer->back ? es_maxf(along, 1e-3f) : es_minf(along, -1e-3f)), -0.5f * depth, 0.5f * depth);
         } else {
-            depth = depth * es_clampf(es_v3_dot(n, middle) / es_minf(along, -1e-6f), 0.5f, 2.0f);
+            depth = depth * es_clampf(es_v3_dot(n, middle) / (layer->back ? es_maxf(along, 1e-6f) : es_minf(along, -1e-6f)), 0.5f, 2.0f);
         }
     }
-    const es_patch_v v = es_patch_of_pixel_v(rays, pixel_area, vf_set1(column), vf_set1(row), vf_set1(depth), vi_set1((int32_t)g->normal[i]), vm_gt(vf_set1(depth), vf_zero()));
+    const es_patch_v v = es_patch_of_pixel_v(rays, pixel_area, layer->back, vf_set1(column), vf_set1(row), vf_set1(depth), vi_set1((int32_t)g->normal[i]), vm_gt(vf_set1(depth), vf_zero()));
     *node = (es_residual_node){{v.x[0], v.y[0], v.z[0]}, v.area[0], {v.nx[0], v.ny[0], v.nz[0]}, v.radius[0]};
     for (int k = 0; k < 3; k++) sent[k] = node->area > 0.0f ? layer->radiance[k][i] * node->area : 0.0f;
 }
@@ -274,7 +274,7 @@ static bool read_receivers(const es_residual_job* job, vi columns, uint32_t row,
     /* a tenth of a pixel's width off the surface, towards the eye: on the very line where two surfaces meet, neither sees the other */
     const float *step = rays->orthographic ? rays->base_dx : rays->dir_dx, width = 0.1f * es_sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]);
     const vf lifted = rays->orthographic ? depth - vf_set1(width) : depth * vf_set1(1.0f - es_minf(width, 0.5f));
-    const es_patch_v p = es_patch_of_pixel_v(rays, 1.0f, vf_from_int(columns), vf_set1((float)row), lifted, vi_gather(g->normal, at), r->wanted);
+    const es_patch_v p = es_patch_of_pixel_v(rays, 1.0f, false, vf_from_int(columns), vf_set1((float)row), lifted, vi_gather(g->normal, at), r->wanted);
     r->x = p.x;
     r->y = p.y;
     r->z = p.z;

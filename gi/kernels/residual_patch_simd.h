@@ -23,8 +23,8 @@ VINL float es_pixel_area(const es_pixel_rays* r)
 }
 
 /* Area is dA = depth² da / (n · -d), d being the pixel's ray with depth 1; times the falloff beyond 80 degrees. 0 where `seen` is not set and where the
- * interpolated normal faces away. */
-VINL es_patch_v es_patch_of_pixel_v(const es_pixel_rays* r, float pixel_area, vf column, vf row, vf depth, vi normal, vm seen)
+ * interpolated normal faces away; `back`: towards. */
+VINL es_patch_v es_patch_of_pixel_v(const es_pixel_rays* r, float pixel_area, bool back, vf column, vf row, vf depth, vi normal, vm seen)
 {
     es_patch_v p;
     const vf dx = vf_set1(r->dir[0]) + column * vf_set1(r->dir_dx[0]) + row * vf_set1(r->dir_dy[0]);
@@ -35,7 +35,7 @@ VINL es_patch_v es_patch_of_pixel_v(const es_pixel_rays* r, float pixel_area, vf
     p.y = (vf_set1(r->base[1]) + column * vf_set1(r->base_dx[1]) + row * vf_set1(r->base_dy[1])) + depth * dy;
     p.z = (vf_set1(r->base[2]) + column * vf_set1(r->base_dx[2]) + row * vf_set1(r->base_dy[2])) + depth * dz;
     es_unpack_normal_v(normal, &p.nx, &p.ny, &p.nz);
-    const vf towards = vf_neg(p.nx * dx + p.ny * dy + p.nz * dz), facing = vf_max(towards, vf_set1(1e-6f));
+    const vf away = p.nx * dx + p.ny * dy + p.nz * dz, towards = back ? away : vf_neg(away), facing = vf_max(towards, vf_set1(1e-6f));
     const vf grazing = vf_min(facing / (vf_sqrt(dx * dx + dy * dy + dz * dz) * vf_set1(ES_RESIDUAL_GRAZING)), vf_set1(1.0f));
     vf area = vf_set1(pixel_area) / facing * (grazing * grazing);
     /* of a plane seen along its parts at half and at double the distance count at most */

@@ -15,7 +15,7 @@ typedef struct part { es_patch_v patch; vf sent[3]; vm edge; } part;
 VINL part part_of_pixels(const es_residual_layer* layer, float pixel_area, vf column, float row, vf depth, vi normal, vm inside, vf r, vf g, vf b)
 {
     part p;
-    p.patch = es_patch_of_pixel_v(&layer->rays, pixel_area, column, vf_set1(row), depth, normal, inside & vm_gt(depth, vf_zero()));
+    p.patch = es_patch_of_pixel_v(&layer->rays, pixel_area, layer->back, column, vf_set1(row), depth, normal, inside & vm_gt(depth, vf_zero()));
     const vm there = vm_gt(p.patch.area, vf_zero());
     p.sent[0] = vf_and(there, r) * p.patch.area;
     p.sent[1] = vf_and(there, g) * p.patch.area;

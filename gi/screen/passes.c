@@ -165,6 +165,14 @@ static es_result light_layer(es_renderer* r, es_screen_layer* layer, es_screen_v
     return ES_OK;
 }
 
+es_result es_screen_light_layers(es_renderer* r)
+{
+    es_screen_buffers* b = &r->screen;
+    es_result result = ES_OK;
+    for (uint32_t i = 1; i < b->stack.views[0].layer_count && !result; i++) result = light_layer(r, &b->layers[0][i], &b->stack.views[0], i);
+    return result;
+}
+
 static es_result light_views(es_renderer* r)
 {
     es_screen_buffers* b = &r->screen;

@@ -10,6 +10,8 @@ es_result es_screen_first_layer(es_renderer* renderer, es_depth_range* range, co
 es_result es_pass_screen_views(es_renderer* renderer, const es_frame_inputs* in);
 /* Light of the environment with lamps screen and ambient. After the light of other lamps. */
 es_result es_pass_screen_occlusion(es_renderer* renderer, const es_frame_inputs* in);
+/* Direct light of the layers behind the camera's first, into es_screen_layer.direct: of light sources without a size. */
+es_result es_screen_light_layers(es_renderer* renderer);
 /* After all direct light. */
 es_result es_pass_screen_bounce(es_renderer* renderer, const es_frame_inputs* in);
 /* Sets the planes of lamps' light to those that hold the environment's as well, where the frame has such. */

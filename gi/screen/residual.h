@@ -45,6 +45,7 @@ typedef struct es_residual_layer {
     const es_gbuffer* gbuffer;     /* depth, normal */
     es_pixel_rays rays;
     const float* radiance[3];      /* rows of gbuffer->stride */
+    bool back;                     /* it shows surfaces from behind: what they send goes to the side that normals point to, away from the eye */
     es_residual_pyramid* pyramid;
 } es_residual_layer;
 

@@ -6,6 +6,7 @@
 #include "gi/lit.h"
 #include "gi/micro/pixels.h"
 #include "gi/micro/upsample.h"
+#include "gi/screen/passes.h"
 
 const char* es_residual_nothing(const es_renderer_settings* s)
 {
@@ -21,7 +22,7 @@ uint32_t es_residual_steps(const es_renderer* r) { return r->plan.valid[ES_PASS_
 
 void es_residual_buffers_free(es_context* context, es_residual_buffers* b)
 {
-    es_residual_free(context, &b->pyramid);
+    for (uint32_t i = 0; i < ES_RESIDUAL_LAYERS; i++) es_residual_free(context, &b->pyramids[i]);
     es_planes* const planes[] = {&b->sent, &b->sparse_irradiance, &b->sparse_specular, &b->irradiance, &b->specular};
     for (size_t i = 0; i < sizeof planes / sizeof planes[0]; i++) es_planes_free(context, planes[i]);
     for (uint32_t i = 0; i < ES_RESIDUAL_STEPS; i++) es_planes_free(context, &b->steps[i]);
@@ -47,7 +48,7 @@ static es_result reserve(es_renderer* r, es_gbuffer* sparse)
     *sparse = (es_gbuffer){.width = es_micro_sparse(r->gbuffer.width, s->compensation_spacing), .height = es_micro_sparse(r->gbuffer.height, s->compensation_spacing)};
     sparse->stride = (sparse->width + 7) / 8 * 8;
     const bool whole = s->compensation_spacing == 1;
-    es_result result = es_residual_reserve(r->context, &b->pyramid, r->gbuffer.width, r->gbuffer.height, s->compensation_levels);
+    es_result result = es_residual_reserve(r->context, &b->pyramids[0], r->gbuffer.width, r->gbuffer.height, s->compensation_levels);
     if (!result) result = es_planes_resize(r->context, &b->irradiance, &r->gbuffer);
     if (!result && r->has_specular) result = es_planes_resize(r->context, &b->specular, &r->gbuffer);
     if (!result && !whole) result = es_planes_resize(r->context, &b->sparse_irradiance, sparse);
@@ -74,8 +75,23 @@ static void upsample(es_renderer* r, const es_gbuffer* sparse, uint32_t kind, co
     es_micro_upsample(r->context, &job);
 }
 
-/* One application of the residual operator: into the buffers' irradiance and specular. */
-static es_result apply(es_renderer* r, const es_frame_inputs* in, const es_planes* sent, uint64_t* samples)
+/* What the camera does not see of what is near what it sees sends the direct light that it has. */
+static es_result add_layers(es_renderer* r, es_residual_job* job)
+{
+    const es_screen_view* view = &r->screen.stack.views[0];
+    if (!r->plan.valid[ES_PASS_DIRECT]) return ES_OK;
+    es_result result = view->layer_count > 1 ? es_screen_light_layers(r) : ES_OK;
+    for (uint32_t i = 1; i < view->layer_count && i < ES_RESIDUAL_LAYERS && !result; i++) {
+        const es_screen_layer* from = &r->screen.layers[0][i];
+        es_residual_pyramid* pyramid = &r->residual.pyramids[i];
+        result = es_residual_reserve(r->context, pyramid, r->gbuffer.width, r->gbuffer.height, r->settings.compensation_levels);
+        job->layers[job->layer_count++] = (es_residual_layer){.gbuffer = &from->gbuffer, .rays = r->rays, .radiance = {from->direct.at[0], from->direct.at[1], from->direct.at[2]}, .back = i % 2 == 1, .pyramid = pyramid};
+    }
+    return result;
+}
+
+/* One application of the residual operator: into the buffers' irradiance and specular. `layers`: what is peeled sends too. */
+static es_result apply(es_renderer* r, const es_frame_inputs* in, const es_planes* sent, bool layers, uint64_t* samples)
 {
     const es_renderer_settings* s = &r->settings;
     es_residual_buffers* b = &r->residual;
@@ -85,13 +101,15 @@ static es_result apply(es_renderer* r, const es_frame_inputs* in, const es_plane
     es_arena_reset(&r->arena);
     es_residual_job job = {.layer_count = 1, .bound = es_geometry_bound(s, in), .solid_angle = s->compensation_solid_angle, .discontinuity = s->compensation_discontinuity, .gbuffer = &r->gbuffer, .rays = r->rays,
         .lobe_roughness = s->lobe_roughness, .spacing = s->compensation_spacing, .stride = sparse.stride};
-    job.layers[0] = (es_residual_layer){.gbuffer = &r->gbuffer, .rays = r->rays, .radiance = {sent->at[0], sent->at[1], sent->at[2]}, .pyramid = &b->pyramid};
+    job.layers[0] = (es_residual_layer){.gbuffer = &r->gbuffer, .rays = r->rays, .radiance = {sent->at[0], sent->at[1], sent->at[2]}, .pyramid = &b->pyramids[0]};
+    if (layers) result = add_layers(r, &job);
+    if (result) return result;
     const size_t list_bytes = (size_t)es_micro_list_stride(r->gbuffer.width) * r->gbuffer.height;
     job.samples = es_arena_allocate(&r->arena, r->gbuffer.height * sizeof *job.samples);
     uint8_t* listed = es_arena_allocate(&r->arena, 2 * list_bytes);
     if (!job.samples || !listed) return es_context_last_result(r->context);
     memset(job.samples, 0, r->gbuffer.height * sizeof *job.samples);
-    es_residual_build(r->context, &job.layers[0]);
+    for (uint32_t i = 0; i < job.layer_count; i++) es_residual_build(r->context, &job.layers[i]);
     if (s->compensation_spacing == 1) {
         job.stride = r->gbuffer.stride;
         aim(&job, &b->irradiance, &b->specular, r->has_specular);
@@ -146,7 +164,7 @@ es_result es_pass_residual(es_renderer* r, const es_frame_inputs* in)
     }
     es_plan_begin(plan, ES_PASS_RESIDUAL);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
-    const es_pass direct[] = {ES_PASS_DIRECT, ES_PASS_LAMP_LIGHT, ES_PASS_LAMP_FILTER, ES_PASS_SCREEN_OCCLUSION};
+    const es_pass direct[] = {ES_PASS_DIRECT, ES_PASS_LAMP_LIGHT, ES_PASS_LAMP_FILTER, ES_PASS_SCREEN_OCCLUSION, ES_PASS_SCREEN_VIEWS, ES_PASS_SHADOW_MAPS};
     for (size_t i = 0; i < sizeof direct / sizeof direct[0]; i++) es_plan_reads_pass(plan, direct[i]);
     es_indirect_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_FILTER);
@@ -160,7 +178,7 @@ es_result es_pass_residual(es_renderer* r, const es_frame_inputs* in)
     uint64_t samples = 0;
     es_result result = compose_sent(r, &r->residual.sent);
     for (uint32_t i = 0; i < s->compensation_steps && !result; i++) {
-        result = apply(r, in, i ? &r->residual.steps[i - 1] : &r->residual.sent, &samples);
+        result = apply(r, in, i ? &r->residual.steps[i - 1] : &r->residual.sent, i == 0, &samples);
         if (!result) result = reflect(r, &r->residual.steps[i]);
     }
     if (!result) es_plan_done(plan, ES_PASS_RESIDUAL, samples);

@@ -1,6 +1,7 @@
 /* Which views the screen-space methods look into: layers peeled from the camera's, and further cameras (gi/screen/view_stack.h). */
 #include "gi/kernel_table.h"
 #include "gi/screen/passes.h"
+#include "gi/screen/residual_pass.h"
 #include "platform/maths.h"
 
 /* Of a layer whose surfaces send light; of one that only hides. */
@@ -8,7 +9,7 @@ enum { LIT_PLANES = ES_GBUFFER_DEPTH | ES_GBUFFER_NORMAL | ES_GBUFFER_GEOMETRIC_
 
 static bool wanted(const es_renderer_settings* s, const es_frame_inputs* in)
 {
-    return in->has_geometry && (s->screen_bounce || s->screen_repair || ((s->lamps == ES_LAMPS_SCREEN || s->lamps == ES_LAMPS_AMBIENT) && in->has_environment));
+    return in->has_geometry && (s->screen_bounce || s->screen_repair || !es_residual_nothing(s) || ((s->lamps == ES_LAMPS_SCREEN || s->lamps == ES_LAMPS_AMBIENT) && in->has_environment));
 }
 
 es_result es_screen_first_layer(es_renderer* r, es_depth_range* range, const es_depth_range** wanted_range)
@@ -111,7 +112,7 @@ es_result es_pass_screen_views(es_renderer* r, const es_frame_inputs* in)
         es_plan_not_needed(plan, ES_PASS_SCREEN_VIEWS, why);
         return ES_OK;
     }
-    const uint32_t planes = s->screen_bounce ? (uint32_t)LIT_PLANES : (uint32_t)ES_GBUFFER_DEPTH;
+    const uint32_t planes = s->screen_bounce || !es_residual_nothing(s) ? (uint32_t)LIT_PLANES : (uint32_t)ES_GBUFFER_DEPTH;
     es_plan_begin(plan, ES_PASS_SCREEN_VIEWS);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     const uint32_t words[] = {s->screen_layers, s->screen_cameras, planes};
