@@ -433,7 +433,7 @@ static void test_memory_cap(void** state)
     (void)state;
     int failed = 0, whole = 0;
     uint64_t expected = 0;
-    for (size_t cap = 24 << 20; cap >= 1 << 20; cap = cap * 4 / 5) {
+    for (size_t cap = 32 << 20; cap >= 1 << 20; cap = cap * 4 / 5) {
         es_context_desc desc = es_default_context_desc();
         desc.threads = 2;
         desc.memory_cap = cap;
