@@ -16,6 +16,7 @@
 #include "gi/reference/scene.h"
 #include "platform/maths.h"
 #include "platform/random.h"
+#include "tests/races.h"
 #include "tests/same_bits.h"
 #include "tests/reference_runs.h"
 
@@ -494,15 +495,15 @@ static void test_turning(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_power),
-        cmocka_unit_test(test_constant),
-        cmocka_unit_test(test_against_sums),
-        cmocka_unit_test(test_orientation),
-        cmocka_unit_test(test_lights),
+        unit_test_without_races(test_power),
+        unit_test_without_races(test_constant),
+        unit_test_without_races(test_against_sums),
+        unit_test_without_races(test_orientation),
+        unit_test_without_races(test_lights),
         cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_little_memory),
-        cmocka_unit_test(test_background),
-        cmocka_unit_test(test_turning),
+        unit_test_without_races(test_little_memory),
+        unit_test_without_races(test_background),
+        unit_test_without_races(test_turning),
     };
     return cmocka_run_group_tests_name("environment map", tests, NULL, NULL);
 }

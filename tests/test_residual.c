@@ -12,6 +12,7 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "raster/pack.h"
+#include "tests/races.h"
 #include "tests/same_bits.h"
 
 /* ---- a corner seen from its bisector ------------------------------------------------------------------------------------------------ */
@@ -281,7 +282,7 @@ static void test_parts_add_up(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_corner), cmocka_unit_test(test_samples), cmocka_unit_test(test_each_for_itself), cmocka_unit_test(test_kernels), cmocka_unit_test(test_parts_add_up),
+        unit_test_without_races(test_corner), unit_test_without_races(test_samples), unit_test_without_races(test_each_for_itself), cmocka_unit_test(test_kernels), unit_test_without_races(test_parts_add_up),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

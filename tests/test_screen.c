@@ -11,6 +11,7 @@
 
 #include "gi/screen/sample_sets.h"
 #include "tests/reference_runs.h"
+#include "tests/races.h"
 #include "tests/same_bits.h"
 #include "tests/small_worlds.h"
 
@@ -364,7 +365,7 @@ static void test_bits(void** state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sets), cmocka_unit_test(test_planes), cmocka_unit_test(test_corner), cmocka_unit_test(test_beyond), cmocka_unit_test(test_layers), cmocka_unit_test(test_repair),
-        cmocka_unit_test(test_bounce), cmocka_unit_test(test_bits)};
+    const struct CMUnitTest tests[] = {unit_test_without_races(test_sets), unit_test_without_races(test_planes), unit_test_without_races(test_corner), unit_test_without_races(test_beyond), unit_test_without_races(test_layers), unit_test_without_races(test_repair),
+        unit_test_without_races(test_bounce), cmocka_unit_test(test_bits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include "gi/gi.h"
 #include "gi/pixel_rays.h"
 #include "platform/context.h"
+#include "tests/races.h"
 #include "tests/same_bits.h"
 
 enum { WIDTH = 90, HEIGHT = 62, LIGHTS = 60 };
@@ -189,6 +190,6 @@ static void test_bits(void** state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sum), cmocka_unit_test(test_parts), cmocka_unit_test(test_bits)};
+    const struct CMUnitTest tests[] = {unit_test_without_races(test_sum), unit_test_without_races(test_parts), cmocka_unit_test(test_bits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
