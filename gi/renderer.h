@@ -52,7 +52,6 @@ typedef struct es_second_order_buffers {
     es_gbuffer half;
     es_planes half_positive, half_negative;
     es_planes taken, negative;
-    uint32_t negative_count;   /* lights of this frame */
 } es_second_order_buffers;
 
 /* What bias compensation in screen space gathers from, and what it found (gi/screen/residual_pass.h). */

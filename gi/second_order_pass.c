@@ -58,10 +58,10 @@ static es_result light(es_renderer* r, const es_frame_inputs* in, uint64_t* whol
     const float bound = es_geometry_bound(s, in), spread = es_vpl_spread(s);
     for (uint32_t i = 0; i < r->vpl_count; i++) positive[i] = es_open_light_of(&r->vpls[i], spread);
     const es_negative_job place = {.gbuffer = g, .rays = r->rays, .lights = positive, .light_count = r->vpl_count, .count = s->second_negative, .seed = s->seed, .bound = bound, .spread = spread};
-    b->negative_count = 0;
-    if (s->second_negative) es_negative_lights_place(r->context, &place, tries, negative, &b->negative_count);
+    uint32_t negative_count = 0;
+    if (s->second_negative) es_negative_lights_place(r->context, &place, tries, negative, &negative_count);
 
-    const es_open_job adds = {.lights = positive, .light_count = r->vpl_count, .bound = bound}, takes = {.lights = negative, .light_count = b->negative_count, .bound = bound};
+    const es_open_job adds = {.lights = positive, .light_count = r->vpl_count, .bound = bound}, takes = {.lights = negative, .light_count = negative_count, .bound = bound};
     es_result result = es_gbuffer_halve(r->context, g, &b->half);
     if (!result) result = shade_half(r, &adds, &b->half_positive);
     if (!result) result = shade_half(r, &takes, &b->half_negative);

@@ -2,8 +2,6 @@
  * forty seconds. What lies under the arcades is lit by the sky that the arches leave, and by what the court's floor and walls send on. */
 #include "sim/scenes/scene_tools.h"
 
-#include <string.h>
-
 #include "platform/maths.h"
 
 static const float half_width = 5.0f, half_depth = 6.0f;          /* of the open court */
@@ -13,15 +11,6 @@ static uint32_t steps(float scale, float count, uint32_t least)
 {
     const uint32_t n = (uint32_t)(count * scale + 0.5f);
     return n < least ? least : n;
-}
-
-static es_material gloss(es_scene_builder* builder, const char* name, float r, float g, float b, float metallic, float roughness)
-{
-    es_material_desc desc = es_default_material_desc();
-    memcpy(desc.base_color, (const float[3]){r, g, b}, 3 * sizeof(float));
-    desc.metallic = metallic;
-    desc.roughness = roughness;
-    return es_build_material(builder, name, &desc);
 }
 
 /* A wall with a round arch in it, from `origin` along `along` (unit) for one span, `out` (unit) being the side that faces the court. The arch stands on the
@@ -117,8 +106,8 @@ static void add_floor(es_scene_builder* builder)
         const float x = -out_x + w * (float)(i % columns), z = back + d * (float)(i / columns);
         es_shape_quad(&slabs[(i % columns + i / columns) % 2], es_v3(x, 0, z), es_v3(x + w, 0, z), es_v3(x + w, 0, z + d), es_v3(x, 0, z + d), es_v3(0, 1, 0));
     }
-    es_build_object(builder, "pale slabs", &slabs[0], gloss(builder, "travertine", 0.56f, 0.52f, 0.45f, 0, 0.35f), es_v3(0, 0, 0));
-    es_build_object(builder, "red slabs", &slabs[1], gloss(builder, "terracotta", 0.45f, 0.20f, 0.13f, 0, 0.45f), es_v3(0, 0, 0));
+    es_build_object(builder, "pale slabs", &slabs[0], es_build_gloss(builder, "travertine", 0.56f, 0.52f, 0.45f, 0, 0.35f), es_v3(0, 0, 0));
+    es_build_object(builder, "red slabs", &slabs[1], es_build_gloss(builder, "terracotta", 0.45f, 0.20f, 0.13f, 0, 0.45f), es_v3(0, 0, 0));
 }
 
 static void add_things(es_scene_builder* builder, float scale)
@@ -133,8 +122,8 @@ static void add_things(es_scene_builder* builder, float scale)
     es_shape_cylinder(&water, es_v3(at.x, 0.4f, at.z), 1.1f, 0.27f, steps(scale, 64, 8));
     es_shape_sphere(&ball, es_v3(at.x, 1.78f, at.z), 0.40f, steps(scale, 96, 12), steps(scale, 48, 6));
     es_build_object(builder, "fountain", &stone, es_build_lambert(builder, "marble", 0.78f, 0.77f, 0.74f), es_v3(0, 0, 0));
-    es_build_object(builder, "water", &water, gloss(builder, "water", 0.03f, 0.10f, 0.11f, 0, 0.12f), es_v3(0, 0, 0));
-    es_build_object(builder, "copper ball", &ball, gloss(builder, "copper", 0.95f, 0.64f, 0.54f, 1, 0.15f), es_v3(0, 0, 0));
+    es_build_object(builder, "water", &water, es_build_gloss(builder, "water", 0.03f, 0.10f, 0.11f, 0, 0.12f), es_v3(0, 0, 0));
+    es_build_object(builder, "copper ball", &ball, es_build_gloss(builder, "copper", 0.95f, 0.64f, 0.54f, 1, 0.15f), es_v3(0, 0, 0));
 
     /* pots with round shrubs */
     static const es_vec2 pot[] = {{0, 0}, {0.20f, 0}, {0.30f, 0.40f}, {0.34f, 0.42f}, {0.34f, 0.48f}, {0.28f, 0.48f}, {0.27f, 0.42f}, {0, 0.42f}};
@@ -166,9 +155,9 @@ static void add_things(es_scene_builder* builder, float scale)
     es_shape_torus_knot(&knot, es_v3(-2.25f, 1.22f, 0.55f), 2, 3, 0.36f, 0.075f, steps(scale, 160, 16), steps(scale, 16, 4));
     es_build_object(builder, "bench", &bench, es_build_lambert(builder, "oak", 0.40f, 0.27f, 0.15f), es_v3(0, 0, 0));
     es_build_object(builder, "door", &door, es_build_lambert(builder, "blue paint", 0.07f, 0.19f, 0.42f), es_v3(0, 0, 0));
-    es_build_object(builder, "jar", &jar, gloss(builder, "brass", 0.91f, 0.78f, 0.42f, 1, 0.3f), es_v3(0, 0, 0));
+    es_build_object(builder, "jar", &jar, es_build_gloss(builder, "brass", 0.91f, 0.78f, 0.42f, 1, 0.3f), es_v3(0, 0, 0));
     es_build_object(builder, "plinth", &plinth, es_build_lambert(builder, "tuff", 0.50f, 0.47f, 0.42f), es_v3(0, 0, 0));
-    es_build_object(builder, "knot", &knot, gloss(builder, "green glaze", 0.05f, 0.30f, 0.20f, 0, 0.2f), es_v3(0, 0, 0));
+    es_build_object(builder, "knot", &knot, es_build_gloss(builder, "green glaze", 0.05f, 0.30f, 0.20f, 0, 0.2f), es_v3(0, 0, 0));
 }
 
 es_result es_scene_courtyard(es_world* world, uint32_t triangles)

@@ -12,15 +12,6 @@ static uint32_t steps(float scale, float count, uint32_t least)
     return n < least ? least : n;
 }
 
-static es_material gloss(es_scene_builder* builder, const char* name, float r, float g, float b, float metallic, float roughness)
-{
-    es_material_desc desc = es_default_material_desc();
-    memcpy(desc.base_color, (const float[3]){r, g, b}, 3 * sizeof(float));
-    desc.metallic = metallic;
-    desc.roughness = roughness;
-    return es_build_material(builder, name, &desc);
-}
-
 static void add_room(es_scene_builder* builder)
 {
     es_shape floor = es_build_shape(builder), wall = es_build_shape(builder);
@@ -121,9 +112,9 @@ static void add_toys(es_scene_builder* builder, float scale)
         es_shape_sphere(&beads, es_v3(-0.75f + (0.19f + 0.004f * (float)i) * c, 0.026f, 0.95f + (0.16f + 0.003f * (float)i) * s), 0.026f, steps(scale, 20, 6), steps(scale, 10, 3));
     }
     es_build_object(builder, "ball", &ball, es_build_lambert(builder, "rubber", 0.75f, 0.30f, 0.08f), es_v3(0, 0, 0));
-    es_build_object(builder, "steel ball", &metal, gloss(builder, "steel", 0.75f, 0.75f, 0.76f, 1, 0.25f), es_v3(0, 0, 0));
-    es_build_object(builder, "rings", &ring, gloss(builder, "lacquer", 0.60f, 0.14f, 0.30f, 0, 0.3f), es_v3(0, 0, 0));
-    es_build_object(builder, "top", &top, gloss(builder, "tin", 0.20f, 0.48f, 0.55f, 0, 0.25f), es_v3(0, 0, 0));
+    es_build_object(builder, "steel ball", &metal, es_build_gloss(builder, "steel", 0.75f, 0.75f, 0.76f, 1, 0.25f), es_v3(0, 0, 0));
+    es_build_object(builder, "rings", &ring, es_build_gloss(builder, "lacquer", 0.60f, 0.14f, 0.30f, 0, 0.3f), es_v3(0, 0, 0));
+    es_build_object(builder, "top", &top, es_build_gloss(builder, "tin", 0.20f, 0.48f, 0.55f, 0, 0.25f), es_v3(0, 0, 0));
     es_build_object(builder, "cup", &cup, es_build_lambert(builder, "china", 0.78f, 0.78f, 0.76f), es_v3(0, 0, 0));
     es_build_object(builder, "beads", &beads, es_build_lambert(builder, "glass beads", 0.12f, 0.40f, 0.48f), es_v3(0, 0, 0));
     /* a board that leans on the wall, a hoop that leans on the stairs */

@@ -25,15 +25,6 @@ static uint32_t steps(const detail* d, float count, uint32_t least)
 
 /* ---- materials ----------------------------------------------------------------------------------------------------------- */
 
-static es_material gloss(es_scene_builder* builder, const char* name, float r, float g, float b, float metallic, float roughness)
-{
-    es_material_desc desc = es_default_material_desc();
-    memcpy(desc.base_color, (const float[3]){r, g, b}, 3 * sizeof(float));
-    desc.metallic = metallic;
-    desc.roughness = roughness;
-    return es_build_material(builder, name, &desc);
-}
-
 static es_material phong(es_scene_builder* builder, const char* name, float r, float g, float b, float specular, float exponent)
 {
     es_material_desc desc = es_default_material_desc();
@@ -57,8 +48,8 @@ static void add_shell(es_scene_builder* builder)
             const float x = low_x + tile_x * (float)column, z = low_z + tile_z * (float)row;
             es_shape_quad(&floors[(row + column) % 2], es_v3(x, 0, z), es_v3(x + tile_x, 0, z), es_v3(x + tile_x, 0, z + tile_z), es_v3(x, 0, z + tile_z), es_v3(0, 1, 0));
         }
-    es_build_object(builder, "light slabs", &floors[0], gloss(builder, "travertine", 0.56f, 0.50f, 0.42f, 0, 0.2f), es_v3(0, 0, 0));
-    es_build_object(builder, "dark slabs", &floors[1], gloss(builder, "slate", 0.16f, 0.16f, 0.17f, 0, 0.2f), es_v3(0, 0, 0));
+    es_build_object(builder, "light slabs", &floors[0], es_build_gloss(builder, "travertine", 0.56f, 0.50f, 0.42f, 0, 0.2f), es_v3(0, 0, 0));
+    es_build_object(builder, "dark slabs", &floors[1], es_build_gloss(builder, "slate", 0.16f, 0.16f, 0.17f, 0, 0.2f), es_v3(0, 0, 0));
 
     const es_vec3 size = {high_x - low_x, ceiling_y, high_z - low_z};
     es_shape ceiling = es_build_shape(builder), ends = es_build_shape(builder), left = es_build_shape(builder), right = es_build_shape(builder);
@@ -206,7 +197,7 @@ static void add_metals(es_scene_builder* builder, const detail* d, es_material s
         if (i == 0) es_shape_torus_knot(&shape, es_v3(0, 0.34f, 0), 2, 3, 0.30f, 0.085f, steps(d, 220, 24), steps(d, 22, 6));
         if (i == 1) es_shape_lathe(&shape, es_v3(0, 0, 0), vase, sizeof vase / sizeof vase[0], steps(d, 72, 10));
         if (i == 2) es_shape_sphere(&shape, es_v3(0, 0.34f, 0), 0.34f, steps(d, 64, 12), steps(d, 40, 8));
-        es_build_object(builder, "metal", &shape, gloss(builder, "metal", metals[i][0], metals[i][1], metals[i][2], 1, metals[i][3]), es_v3(x, height, z));
+        es_build_object(builder, "metal", &shape, es_build_gloss(builder, "metal", metals[i][0], metals[i][1], metals[i][2], 1, metals[i][3]), es_v3(x, height, z));
     }
 }
 
@@ -232,7 +223,7 @@ static void add_mobile(es_scene_builder* builder, const detail* d)
         parent = es_build_child(builder, "ring of the mobile", parent, es_v3(0, 0, 0), es_quat_identity());
         es_shape ring = es_build_shape(builder);
         es_shape_torus(&ring, es_v3(0, 0, 0), radii[i], 0.035f, 0.5f * ES_PI, steps(d, 96, 12), steps(d, 20, 5));
-        es_build_instance(builder, parent, es_build_mesh(builder, "ring of the mobile", &ring), gloss(builder, "steel", 0.86f - 0.1f * (float)i, 0.80f, 0.66f + 0.07f * (float)i, 1, roughness[i]));
+        es_build_instance(builder, parent, es_build_mesh(builder, "ring of the mobile", &ring), es_build_gloss(builder, "steel", 0.86f - 0.1f * (float)i, 0.80f, 0.66f + 0.07f * (float)i, 1, roughness[i]));
         es_build_mover(builder, &(es_mover_desc){.name = "turn", .node = parent, .axis = axes[i], .period = periods[i]});
     }
     es_shape wire = es_build_shape(builder);
@@ -300,8 +291,8 @@ static void add_dragon(es_scene_builder* builder, const detail* d, float scale, 
     es_build_object(builder, "plinth", &base, stone, dragon_at);
     es_node node = es_build_node(builder, "dragon", es_v3(dragon_at.x, 0.58f, dragon_at.z), es_quat_identity());
     es_shape_lathe(&shaft, es_v3(0, 0, 0), column, sizeof column / sizeof column[0], around);
-    es_build_instance(builder, node, es_build_mesh(builder, "column", &shaft), gloss(builder, "porphyry", 0.30f, 0.10f, 0.09f, 0, 0.3f));
-    const es_dragon_materials materials = {gloss(builder, "jade", 0.06f, 0.27f, 0.15f, 0, 0.2f), gloss(builder, "ivory", 0.80f, 0.72f, 0.56f, 0, 0.4f), gloss(builder, "amber", 0.90f, 0.45f, 0.06f, 0, 0.1f)};
+    es_build_instance(builder, node, es_build_mesh(builder, "column", &shaft), es_build_gloss(builder, "porphyry", 0.30f, 0.10f, 0.09f, 0, 0.3f));
+    const es_dragon_materials materials = {es_build_gloss(builder, "jade", 0.06f, 0.27f, 0.15f, 0, 0.2f), es_build_gloss(builder, "ivory", 0.80f, 0.72f, 0.56f, 0, 0.4f), es_build_gloss(builder, "amber", 0.90f, 0.45f, 0.06f, 0, 0.1f)};
     es_build_dragon(builder, node, &materials, scale);
     es_build_mover(builder, &(es_mover_desc){.name = "turn", .node = node, .centre = es_v3(dragon_at.x, 0.58f, dragon_at.z), .period = TURN, .phase = -0.02f});
 }
@@ -339,7 +330,7 @@ es_result es_scene_gallery(es_world* world, uint32_t triangles)
     es_scene_builder builder = {world, ES_OK};
     const float scale = triangles ? es_sqrt((float)triangles / (float)(ES_DRAGON_TRIANGLES + OTHER_TRIANGLES)) : 1;
     const detail d = {scale < 1 ? es_sqrt(scale) : scale}; /* the simple things keep their shape longer */
-    es_material stone = gloss(&builder, "marble", 0.66f, 0.65f, 0.62f, 0, 0.35f), gilt = gloss(&builder, "gilt", 1.0f, 0.76f, 0.36f, 1, 0.3f);
+    es_material stone = es_build_gloss(&builder, "marble", 0.66f, 0.65f, 0.62f, 0, 0.35f), gilt = es_build_gloss(&builder, "gilt", 1.0f, 0.76f, 0.36f, 1, 0.3f);
     add_shell(&builder);
     add_pictures(&builder, gilt);
     add_balls(&builder, &d, stone);

@@ -8,15 +8,6 @@
 
 static const float half = 4.2f, height = 3.4f, ring = 1.55f, walk_period = 1.3f;
 
-static es_material gloss(es_scene_builder* builder, const char* name, float r, float g, float b, float metallic, float roughness)
-{
-    es_material_desc desc = es_default_material_desc();
-    memcpy(desc.base_color, (const float[3]){r, g, b}, 3 * sizeof(float));
-    desc.metallic = metallic;
-    desc.roughness = roughness;
-    return es_build_material(builder, name, &desc);
-}
-
 static void add_room(es_scene_builder* builder)
 {
     es_shape floor = es_build_shape(builder), walls = es_build_shape(builder), ceiling = es_build_shape(builder), shelves = es_build_shape(builder);
@@ -31,7 +22,7 @@ static void add_room(es_scene_builder* builder)
         es_shape_box(&shelves, es_v3(-half + 0.01f, y, -half + 0.01f), es_v3(half - 1.2f, y + 0.04f, -half + 0.45f));
         es_shape_box(&shelves, es_v3(half - 0.45f, y, -2.9f), es_v3(half - 0.01f, y + 0.04f, 2.2f));
     }
-    es_build_object(builder, "floor slabs", &floor, gloss(builder, "parquet", 0.38f, 0.24f, 0.14f, 0, 0.35f), es_v3(0, 0, 0));
+    es_build_object(builder, "floor slabs", &floor, es_build_gloss(builder, "parquet", 0.38f, 0.24f, 0.14f, 0, 0.35f), es_v3(0, 0, 0));
     es_build_object(builder, "ceiling slabs", &ceiling, es_build_lambert(builder, "white", 0.76f, 0.75f, 0.72f), es_v3(0, 0, 0));
     es_build_object(builder, "wall slabs", &walls, es_build_lambert(builder, "sage", 0.52f, 0.56f, 0.48f), es_v3(0, 0, 0));
     es_build_object(builder, "shelves", &shelves, es_build_lambert(builder, "oak", 0.46f, 0.31f, 0.18f), es_v3(0, 0, 0));
@@ -155,7 +146,7 @@ es_result es_scene_lamp_shop(es_world* world, uint32_t triangles)
         fill_shelf(&builder, es_v3(-half + 0.3f, y, -half + 0.23f), es_v3(half - 1.3f, y, -half + 0.23f), es_v3(0, 0, 1), 7, i, &stands, n);
         fill_shelf(&builder, es_v3(half - 0.23f, y, -2.8f), es_v3(half - 0.23f, y, 2.1f), es_v3(-1, 0, 0), 5, i + 1, &stands, n);
     }
-    es_build_object(&builder, "stands", &stands, gloss(&builder, "brass", 0.90f, 0.76f, 0.42f, 1, 0.3f), es_v3(0, 0, 0));
+    es_build_object(&builder, "stands", &stands, es_build_gloss(&builder, "brass", 0.90f, 0.76f, 0.42f, 1, 0.3f), es_v3(0, 0, 0));
     /* from the ceiling: a panel that is most of the room's white light, balls, tubes */
     es_area_light_desc lamp = es_default_area_light_desc();
     lamp.name = "flat lamp of the ceiling";

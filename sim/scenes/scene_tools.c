@@ -22,6 +22,15 @@ es_material es_build_lambert(es_scene_builder* builder, const char* name, float 
     return es_build_material(builder, name, &desc);
 }
 
+es_material es_build_gloss(es_scene_builder* builder, const char* name, float r, float g, float b, float metallic, float roughness)
+{
+    es_material_desc desc = es_default_material_desc();
+    memcpy(desc.base_color, (const float[3]){r, g, b}, 3 * sizeof(float));
+    desc.metallic = metallic;
+    desc.roughness = roughness;
+    return es_build_material(builder, name, &desc);
+}
+
 es_shape es_build_shape(es_scene_builder* builder)
 {
     es_shape shape = es_shape_begin(es_world_context(builder->world));

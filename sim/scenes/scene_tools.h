@@ -10,6 +10,8 @@ typedef struct es_scene_builder { es_world* world; es_result result; } es_scene_
 es_material es_build_material(es_scene_builder* builder, const char* name, const es_material_desc* desc);
 /* Lambert: no specular term. */
 es_material es_build_lambert(es_scene_builder* builder, const char* name, float r, float g, float b);
+/* Lambert and GGX of that roughness, 0 … 1; specular 1. */
+es_material es_build_gloss(es_scene_builder* builder, const char* name, float r, float g, float b, float metallic, float roughness);
 /* For es_build_mesh or es_build_object; the builder fails with it. */
 es_shape es_build_shape(es_scene_builder* builder);
 /* Consumes the shape. */
