@@ -45,7 +45,7 @@ static void append(es_contacts* to, const es_contacts* from, const es_contact* c
     es_contact* copy = &to->list[to->count++];
     *copy = *contact;
     copy->first = (uint32_t)to->manifold_count;
-    memcpy(to->manifolds + to->manifold_count, from->manifolds + contact->first, contact->count * sizeof *to->manifolds);
+    if (contact->count) memcpy(to->manifolds + to->manifold_count, from->manifolds + contact->first, contact->count * sizeof *to->manifolds);
     to->manifold_count += contact->count;
 }
 

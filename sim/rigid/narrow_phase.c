@@ -58,15 +58,18 @@ static void collide(es_world* world, es_contact* contact, es_contact_manifold* m
     contact->touching = contact->count > 0 && (contact->touching || meets);
 }
 
+/* Sensors have no manifolds: where all contacts are theirs, the list has no memory to count from. */
+static es_contact_manifold* from(es_contact_manifold* manifolds, uint32_t first) { return manifolds ? manifolds + first : NULL; }
+
 static void collide_block(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 {
     es_world* world = user;
     es_rigid* rigid = world->rigid;
     for (uint32_t i = begin; i < end; i++) {
         es_contact* contact = &rigid->next.list[i];
-        const es_contact_manifold* old = rigid->contacts.manifolds + contact->first;
+        const es_contact_manifold* old = from(rigid->contacts.manifolds, contact->first);
         contact->first = rigid->starts[i];
-        collide(world, contact, rigid->next.manifolds + contact->first, rigid->starts[i + 1] - rigid->starts[i], old);
+        collide(world, contact, from(rigid->next.manifolds, contact->first), rigid->starts[i + 1] - rigid->starts[i], old);
     }
 }
 
