@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/blend_passes.h"
 #include "gi/bounces.h"
 #include "gi/classic.h"
 #include "gi/indirect.h"
@@ -198,6 +199,7 @@ static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* resu
     memset(&shaded, 0, sizeof shaded);
     memset(&whole, 0, sizeof whole);
     memset(&filtered, 0, sizeof filtered);
+    es_planes layers = {0};
     if (!open && (bounces < r->stats.bounce_count || r->plan.valid[ES_PASS_TEMPORAL])) {
         outcome = es_indirect_shade(r, es_bounce_end(r, bounces), &shaded.irradiance, &shaded.specular);
         if (!outcome && r->filter_passes) outcome = es_indirect_filter(r, &shaded.irradiance, &shaded.specular, &filtered.irradiance, &filtered.specular);
@@ -211,11 +213,16 @@ static es_result first_bounces(es_renderer* r, uint32_t bounces, es_planes* resu
             job.specular[k] = r->has_specular ? last->specular.at[k] : NULL;
         }
     }
-    for (int k = 0; k < 3; k++) job.indirect[k] = result->at[k];
+    if (!outcome && !open && bounces < r->stats.bounce_count) outcome = es_blend_bounded(r, es_bounce_end(r, bounces), &layers);
+    for (int k = 0; k < 3; k++) {
+        job.indirect[k] = result->at[k];
+        if (layers.memory) job.layers.bounded[k] = layers.at[k];
+    }
     if (!outcome) es_compose(r->context, &job);
     es_indirect_planes_free(r->context, &shaded);
     es_indirect_planes_free(r->context, &whole);
     es_indirect_planes_free(r->context, &filtered);
+    es_planes_free(r->context, &layers);
     return outcome;
 }
 

@@ -23,7 +23,15 @@ typedef enum es_further_light {
 /* radiance = (emitted + direct) + indirect, the background being emitted,
  * direct = that of light sources without a size + that of lamps,
  * indirect = ((bounded + further[0]) + further[1]) + …, bounded = diffuse + lobe; what is NULL is left out.
- * The sums are what stands here, in this order, so that the parts' images add up to the whole's to the bit. */
+ * The sums are what stands here, in this order, so that the parts' images add up to the whole's to the bit. Where there are blended layers each of the summands (emitted,
+ * direct light of either kind, bounded, every further one) is first composited by itself with those layers: summand · transmittance + the layers'. */
+/* What blended layers leave of the picture behind them, and what they add, weighted (gi/blend.h): planes of the whole picture, of which a rectangle counts. */
+typedef struct es_compose_layers {
+    const float* transmittance;   /* NULL: there are no layers */
+    const float *emitted[3], *direct[3], *lamps[3], *bounded[3]; /* NULL: none */
+    uint32_t column_begin, column_end, row_begin, row_end; /* columns are multiples of eight */
+} es_compose_layers;
+
 typedef struct es_compose_job {
     const es_gbuffer* gbuffer;
     const float* background[3];   /* radiance where nothing is seen, 0 elsewhere; NULL: none */
@@ -35,6 +43,7 @@ typedef struct es_compose_job {
     const float* specular[3];     /* indirect radiance reflected by the lobe, NULL: none */
     const uint8_t* lit;           /* where that may be lit (gi/lit.h) */
     const float* further[ES_FURTHER_LIGHTS][3]; /* reflected radiance, of either sign; NULL: none */
+    es_compose_layers layers;     /* composited with all but `reflected` */
     const float* finished[3];     /* the radiance itself, in place of all of the above; NULL: it is to be made */
     float exposure_scale;         /* 2^stops */
     float white;                  /* Reinhard: the radiance that becomes 1 */
@@ -46,7 +55,7 @@ typedef struct es_compose_job {
     float* whole_direct[3];
     float* bounded[3];
     float* indirect[3];
-    float* reflected[3];          /* direct + bounded */
+    float* reflected[3];          /* direct + bounded, of the surfaces of the G-buffer */
     float* display[3];            /* after the tone map, linear [0, 1]; NULL: not wanted */
 } es_compose_job;
 

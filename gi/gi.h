@@ -131,6 +131,11 @@ typedef struct es_renderer_settings {
     uint32_t screen_repair;          /* places between a pixel and each light that its shadow map lets through, for what the map's depth bias leaves out (§4.5.1), and imperfect maps' (§4.5.2); 0: none */
     float screen_repair_least;       /* how far from the pixel those places reach at least, share of the scene's extent: point lights' shadows in screen space (fig. 4.6); 0: as far as the bias does; of lights of imperfect maps it is not asked */
     bool screen_bounce;              /* light that surfaces within the radius send each other: what geometry_bound leaves out, then with spread 0; with NONE all; not with MICRO */
+    /* blended surfaces (es_material_desc.blend) */
+    uint32_t blend_layers;           /* 0 … 4: so many of them in front of each pixel's solid surface are peeled (Everitt 2001), lit as it is by direct light, lamps and virtual
+                                      * point lights or micro-buffers, and composited; of more than that the nearest count. 0: they are drawn as masked, as light meets them
+                                      * with any setting. Of surfaces at the very same depth one is seen; the side turned to the eye is lit. What screen space and rays find
+                                      * besides (screen_*, compensation_*, COMPENSATED) they are not lit by, and images of surfaces (depth, normal, motion …) show what is behind */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */
@@ -286,7 +291,8 @@ ES_API size_t es_renderer_points(const es_renderer* renderer, uint32_t map, floa
 
 /* ---- reference: a progressive path tracer over the same world ------------------------------------------------------------------- */
 
-/* All of them by name through es_reference_settings_set. Every vertex of a path samples the lights and the surface, combined by multiple
+/* All of them by name through es_reference_settings_set. The camera sees through blended surfaces, any number of them: each stops a sample with probability alpha; to all
+ * other rays they are masked (es_material_desc.blend). Every vertex of a path samples the lights and the surface, combined by multiple
  * importance sampling (Veach 1997), and neighbouring pixels share their paths (Bekaert et al. 2002). For the same settings samples are
  * a function of pixel and sample number alone: any number of threads, any instruction set and any split into calls or files give the
  * same bits. */

@@ -13,7 +13,7 @@
 typedef enum image_kind {
     IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_NEGATIVE, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
-    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
+    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_TRANSMITTANCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
@@ -50,6 +50,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_LIGHT_NORMAL, "light-normal", "normal in the first light's G-buffer"},
     {IMAGE_IMPORTANCE, "importance", "where the first light's virtual point lights go (Knecht eq. 4.3)"},
     {IMAGE_ISM, "ism", "the first 64 shadow maps of the virtual point lights, 0 near, 1 far or empty"},
+    {IMAGE_TRANSMITTANCE, "transmittance", "share of what is behind blended surfaces that they let through, 0 to 1; 1 where there are none"},
     {IMAGE_MICRO, "micro-buffer", "of the pixel in the middle: its lobe's where it has one"},
     {IMAGE_MICRO_UNWARPED, "micro-buffer-unwarped", "the same laid out over the hemisphere, the normal in the middle"},
     {IMAGE_MICRO_DISTANCE, "micro-buffer-distance", "how far away is what the micro-buffer shows, metres; 0 where nothing is"},
@@ -102,6 +103,27 @@ static void put_albedo(const es_gbuffer* g, uint32_t first_column, es_image* ima
             out[1] = (float)(g->albedo_rg[at] >> 16) * unit;
             out[2] = (float)(g->albedo_b[at] & 0xffff) * unit;
         }
+}
+
+/* How much of what is behind blended layers shows. */
+static float transmittance_at(const es_compose_layers* l, uint32_t stride, uint32_t x, uint32_t y)
+{
+    const bool layered = l->transmittance && x >= l->column_begin && x < l->column_end && y >= l->row_begin && y < l->row_end;
+    return layered ? l->transmittance[(size_t)y * stride + x] : 1.0f;
+}
+
+static void put_transmittance(const es_compose_layers* l, uint32_t stride, es_image* image)
+{
+    for (uint32_t y = 0; y < image->height; y++)
+        for (uint32_t x = 0; x < image->width; x++) image->pixels[(size_t)y * image->width + x] = transmittance_at(l, stride, x, y);
+}
+
+/* A summand of the indirect light, as much of it as shows. */
+static void put_behind(const float* const planes[3], const es_compose_layers* l, uint32_t stride, es_image* image)
+{
+    for (uint32_t y = 0; y < image->height; y++)
+        for (uint32_t x = 0; x < image->width; x++)
+            for (int k = 0; k < 3; k++) image->pixels[((size_t)y * image->width + x) * 3 + k] = planes[k][(size_t)y * stride + x] * transmittance_at(l, stride, x, y);
 }
 
 static void put_planes(const float* const planes[3], uint32_t stride, es_image* image)
@@ -168,7 +190,10 @@ static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* 
         specular = renderer->specular;
     }
     if (kind == IMAGE_INDIRECT_UNFILTERED) job.lit = NULL;
-    if (kind == IMAGE_LAMPS) memset(job.direct, 0, sizeof job.direct);
+    if (kind == IMAGE_LAMPS) {
+        memset(job.direct, 0, sizeof job.direct);
+        memset(job.layers.direct, 0, sizeof job.layers.direct);
+    }
     if (kind != IMAGE_DISPLAY && kind != IMAGE_RADIANCE) memset(job.finished, 0, sizeof job.finished);
     float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : kind == IMAGE_DIRECT || kind == IMAGE_LAMPS ? job.whole_direct : kind == IMAGE_EMISSION ? job.emitted : kind == IMAGE_BOUNDED ? job.bounded : job.indirect;
     for (int k = 0; k < 3; k++) {
@@ -289,7 +314,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         width = height = 8; /* a black image: the frame has no such thing */
         light = NULL;
     }
-    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION;
+    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION || kind == IMAGE_TRANSMITTANCE;
     if (single) channels = 1;
     if (kind == IMAGE_MOTION) channels = 2;
     es_result result = es_image_create(context, width, height, channels, image);
@@ -314,7 +339,14 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_SCREEN_BOUNCE: {
         es_compose_job job = es_renderer_compose_job(renderer);
         const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : kind == IMAGE_NEGATIVE ? ES_FURTHER_NEGATIVE : kind == IMAGE_RESIDUAL ? ES_FURTHER_RESIDUAL + step_of(name) - 1 : ES_FURTHER_BOUNCE];
-        if (planes[0]) put_planes(planes, g->stride, image);
+        const bool summand = kind != IMAGE_IRRADIANCE && kind != IMAGE_BACKGROUND;
+        if (planes[0] && summand) put_behind(planes, &job.layers, g->stride, image);
+        else if (planes[0]) put_planes(planes, g->stride, image);
+        break;
+    }
+    case IMAGE_TRANSMITTANCE: {
+        const es_compose_job job = es_renderer_compose_job(renderer);
+        put_transmittance(&job.layers, g->stride, image);
         break;
     }
     case IMAGE_OCCLUSION: es_screen_occlusion_image(renderer, image->pixels); break;

@@ -64,24 +64,23 @@ float es_vpl_spread(const es_renderer_settings* s) { return !es_residual_nothing
 
 /* ---- shading ---------------------------------------------------------------------------------------------------------------- */
 
-es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradiance, es_planes* specular)
+static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, bool repair, es_planes* irradiance, es_planes* specular)
 {
     const es_renderer_settings* s = &r->frame.settings;
     const float extent = r->frame.extent, near = near_distance_of(r);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, traced = sampled || s->method == ES_GI_VPL_TRACED;
-    const es_gbuffer* shaded = es_indirect_gbuffer(r);
-    es_result result = es_planes_resize(r->context, irradiance, shaded);
-    if (!result && r->has_specular) result = es_planes_resize(r->context, specular, shaded);
+    es_result result = es_planes_resize(r->context, irradiance, of->gbuffer);
+    if (!result && of->lobes) result = es_planes_resize(r->context, specular, of->gbuffer);
     if (result) return result;
-    es_shade_job job = {.gbuffer = shaded, .rays = s->half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - lights,
+    es_shade_job job = {.gbuffer = of->gbuffer, .rays = of->rays, .sampled = sampled, .seed = s->seed, .vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - lights,
         .maps = r->maps.texels, .map_size = r->maps.size, .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = es_vpl_spread(s), .lobe_roughness = s->lobe_roughness,
         .geometry_bound = es_geometry_bound(s, &(es_frame_inputs){.extent = extent}), .interleave = interleave_of(s)};
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = irradiance->at[k];
-        job.specular[k] = r->has_specular ? specular->at[k] : NULL;
+        job.specular[k] = of->lobes ? specular->at[k] : NULL;
     }
-    job.lit = r->has_specular ? specular->lit : NULL;
-    if (s->screen_repair) {
+    job.lit = of->lobes ? specular->lit : NULL;
+    if (repair) {
         job.repair = &r->screen.stack.views[0];
         job.repair_samples = s->screen_repair;
         job.repair_most = s->screen_radius * extent;
@@ -107,6 +106,17 @@ es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradian
     return result ? result : es_shade(r->context, &r->arena, &job);
 }
 
+static es_lit_surfaces picture_of(const es_renderer* r)
+{
+    return (es_lit_surfaces){es_indirect_gbuffer(r), r->frame.settings.half_resolution ? es_pixel_rays_halve(&r->rays) : r->rays, r->has_specular};
+}
+
+es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradiance, es_planes* specular)
+{
+    const es_lit_surfaces picture = picture_of(r);
+    return shade(r, &picture, lights, r->frame.settings.screen_repair != 0, irradiance, specular);
+}
+
 es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
@@ -118,7 +128,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
         es_plan_not_needed(plan, ES_PASS_SHADING, why);
         return ES_OK;
     }
-    r->has_specular = es_frame_has_lobes(r, in->list);
+    r->has_specular = es_frame_has_lobes(r, in->solid);
     es_plan_begin(plan, ES_PASS_SHADING);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_VPLS);
@@ -149,15 +159,14 @@ static const es_planes* shaded_specular(const es_renderer* r) { return blended_f
 /* ---- filter ------------------------------------------------------------------------------------------------------------------ */
 
 /* Lobes that micro-buffers gathered are left as sharp as they are. */
-static bool filters_specular(const es_renderer* r) { return r->has_specular && r->frame.settings.method != ES_GI_MICRO; }
+static bool filters_lobes(const es_renderer* r, bool lobes) { return lobes && r->frame.settings.method != ES_GI_MICRO; }
+static bool filters_specular(const es_renderer* r) { return filters_lobes(r, r->has_specular); }
 static uint32_t filter_size(const es_renderer_settings* s) { return s->method == ES_GI_MICRO ? s->micro_filter : s->interleave; }
 
-es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular)
+static es_result filter(es_renderer* r, const es_gbuffer* shaded, bool lobes, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular)
 {
     const es_renderer_settings* s = &r->frame.settings;
-    const es_gbuffer* shaded = es_indirect_gbuffer(r);
     es_result result = es_planes_resize(r->context, filtered_irradiance, shaded);
-    const bool lobes = filters_specular(r);
     if (!result && lobes) result = es_planes_resize(r->context, filtered_specular, shaded);
     if (result) return result;
     es_filter_job job = {.gbuffer = shaded, .size = filter_size(s), .passes = r->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = lobes ? 6 : 3,
@@ -170,6 +179,24 @@ es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const 
     }
     es_arena_reset(&r->arena);
     return es_filter_geometry_aware(r->context, &r->arena, &job);
+}
+
+es_result es_indirect_filter(es_renderer* r, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular)
+{
+    return filter(r, es_indirect_gbuffer(r), filters_specular(r), irradiance, specular, filtered_irradiance, filtered_specular);
+}
+
+/* r->filter_passes is the picture's, and the same says whether a layer is filtered. */
+es_result es_indirect_filter_layer(es_renderer* r, const es_lit_surfaces* of, es_layer_light* light)
+{
+    light->filtered = r->filter_passes != 0;
+    light->filtered_lobes = light->filtered && filters_lobes(r, of->lobes);
+    return light->filtered ? filter(r, of->gbuffer, light->filtered_lobes, &light->irradiance, &light->specular, &light->filtered_irradiance, &light->filtered_specular) : ES_OK;
+}
+
+es_result es_indirect_shade_layer(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, es_layer_light* light)
+{
+    return shade(r, of, lights, false, &light->irradiance, &light->specular);
 }
 
 es_result es_pass_filter(es_renderer* r, const es_frame_inputs* in)

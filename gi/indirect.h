@@ -16,6 +16,10 @@ es_result es_indirect_shade(es_renderer* renderer, uint32_t lights, es_planes* i
 es_result es_indirect_filter(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular);
 es_result es_indirect_upsample(es_renderer* renderer, const es_planes* irradiance, const es_planes* specular, es_planes* whole_irradiance, es_planes* whole_specular);
 
+/* Shading and filter of a blended layer, at every pixel of it; lights as above. */
+es_result es_indirect_shade_layer(es_renderer* renderer, const es_lit_surfaces* surfaces, uint32_t lights, es_layer_light* light);
+es_result es_indirect_filter_layer(es_renderer* renderer, const es_lit_surfaces* surfaces, es_layer_light* light);
+
 /* What that light is shaded, filtered and blended with last frame's on. */
 const es_gbuffer* es_indirect_gbuffer(const es_renderer* renderer);
 /* What last frame's light is to be blended with. */

@@ -4,6 +4,7 @@
 
 #include "gi/antialias.h"
 #include "gi/background.h"
+#include "gi/blend.h"
 #include "gi/bounces.h"
 #include "gi/compose.h"
 #include "gi/direct.h"
@@ -42,6 +43,7 @@
     X(open_shade, (const es_open_job* job, uint32_t row_begin, uint32_t row_end))                                \
     X(open_upsample, (const es_open_upsample_job* job, uint32_t row_begin, uint32_t row_end))                    \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    X(blend, (const es_blend_job* job, uint32_t row_begin, uint32_t row_end))                                    \
     X(light_points, (const es_point_light_job* job, const es_point_forest* forest, const es_leaf_range* range))  \
     X(push_points, (const es_point_push* push, const es_point_forest* forest, const es_push_range* range)) \
     /* all lights [begin, end) at the points of a batch, whose lanes without a normal get nothing */                \

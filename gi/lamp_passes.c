@@ -8,13 +8,13 @@
 /* Close by, a light is a disc of the area that it stands for. */
 #define LAMP_SPREAD 1.0f
 
-/* The environment's light may be found in screen space (gi/screen/passes.h): its lights then make a bounce, and light no pixels. */
+/* The environment's light may be found in screen space (gi/screen/passes.h): its lights then make a bounce and light blended layers, but not the picture's pixels. */
 static bool sky_in_screen_space(const es_renderer* r) { return r->settings.lamps == ES_LAMPS_SCREEN || r->settings.lamps == ES_LAMPS_AMBIENT; }
-static bool environment_in_set(const es_renderer* r) { return r->plan.valid[ES_PASS_ENVIRONMENT] && !(sky_in_screen_space(r) && r->settings.method == ES_GI_NONE); }
+static bool environment_in_set(const es_renderer* r, const es_frame_inputs* in) { return r->plan.valid[ES_PASS_ENVIRONMENT] && !(sky_in_screen_space(r) && r->settings.method == ES_GI_NONE && !in->layers->instance_count); }
 
 static const char* no_lamps(const es_renderer* r, const es_frame_inputs* in)
 {
-    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : es_something_glows(in->list) || environment_in_set(r) ? NULL : "nothing glows";
+    return r->settings.lamps == ES_LAMPS_NONE ? "lamps is none" : !in->has_geometry ? "nothing to light" : es_something_glows(in->list) || environment_in_set(r, in) ? NULL : "nothing glows";
 }
 
 es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
@@ -27,7 +27,7 @@ es_result es_pass_lamps(es_renderer* r, const es_frame_inputs* in)
         es_lamps_free(r->context, &r->lamps.set);
         return ES_OK;
     }
-    const es_environment_map* environment = environment_in_set(r) ? &r->environment : NULL;
+    const es_environment_map* environment = environment_in_set(r, in) ? &r->environment : NULL;
     const es_lamp_request request = {.list = in->list, .materials = in->revisions.materials, .count = s->lamp_count, .subsets = s->lamp_interleave * s->lamp_interleave, .seed = s->seed,
         .environment = environment, .centre = es_v3_scale(es_v3_add(in->bounds_min, in->bounds_max), 0.5f), .extent = in->extent};
     es_plan_begin(plan, ES_PASS_LAMPS);
@@ -92,67 +92,70 @@ es_shade_job es_lamps_at_points(const es_renderer* r)
 
 static uint32_t shaded_count(const es_renderer* r) { return sky_in_screen_space(r) ? r->lamps.set.glowing : r->lamps.set.shaded_count; }
 
-static es_result shade(es_renderer* r, const es_frame_inputs* in)
+static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, bool repair, es_planes* irradiance, es_planes* specular)
 {
-    const es_renderer_settings* s = &r->settings;
-    es_lamp_light* lamps = &r->lamps;
-    es_result result = es_planes_resize(r->context, &lamps->irradiance, &r->gbuffer);
-    if (!result && lamps->has_specular) result = es_planes_resize(r->context, &lamps->specular, &r->gbuffer);
+    const es_renderer_settings* s = &r->frame.settings;
+    const es_lamp_light* lamps = &r->lamps;
+    es_result result = es_planes_resize(r->context, irradiance, of->gbuffer);
+    if (!result && of->lobes) result = es_planes_resize(r->context, specular, of->gbuffer);
     if (result) return result;
     es_shade_job job = es_lamps_at_points(r);
-    job.gbuffer = &r->gbuffer;
-    job.rays = r->rays;
+    job.gbuffer = of->gbuffer;
+    job.rays = of->rays;
     job.interleave = s->lamp_interleave;
     job.seed = s->seed;
     job.vpls = lamps->set.shaded;
-    job.vpl_count = shaded_count(r);
+    job.vpl_count = lights;
     job.map_of = lamps->set.map_of;
-    if (lamps->has_specular && !r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
+    if (of->lobes && !r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
     job.wide = &r->micro.lobes;
     for (int k = 0; k < 3; k++) {
-        job.irradiance[k] = lamps->irradiance.at[k];
-        job.specular[k] = lamps->has_specular ? lamps->specular.at[k] : NULL;
+        job.irradiance[k] = irradiance->at[k];
+        job.specular[k] = of->lobes ? specular->at[k] : NULL;
     }
-    job.lit = lamps->has_specular ? lamps->specular.lit : NULL;
-    if (s->screen_repair) {
+    job.lit = of->lobes ? specular->lit : NULL;
+    if (repair) {
         job.repair = &r->screen.stack.views[0];
         job.repair_samples = s->screen_repair;
-        job.repair_most = s->screen_radius * in->extent;
+        job.repair_most = s->screen_radius * r->frame.extent;
     }
     es_arena_reset(&r->arena);
     es_vpl_visibility visibility;
     if (es_lamps_want_rays(r)) {
-        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, job.vpls, job.vpl_count, in->extent, &visibility);
+        result = es_vpl_visibility_prepare(&r->arena, &r->trace_scene, job.vpls, job.vpl_count, r->frame.extent, &visibility);
         job.visibility = &visibility.shade;
         job.maps = NULL;
     }
     return result ? result : es_shade(r->context, &r->arena, &job);
 }
 
-static es_result filter(es_renderer* r)
+static es_result filter(es_renderer* r, const es_lit_surfaces* of, const es_planes* irradiance, const es_planes* specular, es_planes* filtered_irradiance, es_planes* filtered_specular)
 {
-    const es_renderer_settings* s = &r->settings;
-    es_lamp_light* lamps = &r->lamps;
-    es_result result = es_planes_resize(r->context, &lamps->filtered_irradiance, &r->gbuffer);
-    if (!result && lamps->has_specular) result = es_planes_resize(r->context, &lamps->filtered_specular, &r->gbuffer);
+    const es_renderer_settings* s = &r->frame.settings;
+    es_result result = es_planes_resize(r->context, filtered_irradiance, of->gbuffer);
+    if (!result && of->lobes) result = es_planes_resize(r->context, filtered_specular, of->gbuffer);
     if (result) return result;
-    es_filter_job job = {.gbuffer = &r->gbuffer, .size = s->lamp_interleave, .passes = s->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = lamps->has_specular ? 6 : 3,
-        .source_lit = lamps->specular.lit, .result_lit = lamps->filtered_specular.lit};
+    es_filter_job job = {.gbuffer = of->gbuffer, .size = s->lamp_interleave, .passes = s->filter_passes, .depth_threshold = s->filter_depth, .normal_threshold = s->filter_normal, .plane_count = of->lobes ? 6 : 3,
+        .source_lit = specular->lit, .result_lit = filtered_specular->lit};
     for (int k = 0; k < 3; k++) {
-        job.source[k] = lamps->irradiance.at[k];
-        job.result[k] = lamps->filtered_irradiance.at[k];
-        job.source[k + 3] = lamps->specular.at[k];
-        job.result[k + 3] = lamps->filtered_specular.at[k];
+        job.source[k] = irradiance->at[k];
+        job.result[k] = filtered_irradiance->at[k];
+        job.source[k + 3] = specular->at[k];
+        job.result[k + 3] = filtered_specular->at[k];
     }
     es_arena_reset(&r->arena);
     return es_filter_geometry_aware(r->context, &r->arena, &job);
 }
 
+static const char* unfiltered(const es_renderer_settings* s) { return !s->filter_passes ? "filter.passes is 0" : s->lamp_interleave == 1 ? "lamps.interleave is 1: nothing to smooth" : NULL; }
+
+static es_lit_surfaces picture_of(const es_renderer* r) { return (es_lit_surfaces){&r->gbuffer, r->rays, r->lamps.has_specular}; }
+
 static es_result pass_filter(es_renderer* r, const char* nothing)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = nothing ? nothing : !s->filter_passes ? "filter.passes is 0" : s->lamp_interleave == 1 ? "lamps.interleave is 1: nothing to smooth" : NULL;
+    const char* why = nothing ? nothing : unfiltered(s);
     r->lamps.filtered = !why;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_LAMP_FILTER, why);
@@ -164,14 +167,16 @@ static es_result pass_filter(es_renderer* r, const char* nothing)
     const float numbers[] = {s->filter_depth, s->filter_normal, (float)s->lamp_interleave, r->lamps.has_specular, (float)s->filter_passes};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_LAMP_FILTER)) return ES_OK;
-    es_result result = filter(r);
+    es_lamp_light* lamps = &r->lamps;
+    const es_lit_surfaces picture = picture_of(r);
+    es_result result = filter(r, &picture, &lamps->irradiance, &lamps->specular, &lamps->filtered_irradiance, &lamps->filtered_specular);
     if (!result) es_plan_done(plan, ES_PASS_LAMP_FILTER, (uint64_t)r->gbuffer.width * r->gbuffer.height * s->filter_passes);
     return result;
 }
 
 /* Direct light is that of the surface model, so a lobe counts however wide it is (es_shade_job.wide): its Fresnel term takes what it reflects from the diffuse part,
  * a quarter where a floor is seen at a slant. */
-static bool anything_specular(const es_draw_list* list)
+bool es_lamps_anything_specular(const es_draw_list* list)
 {
     for (uint32_t i = 0; i < list->instance_count; i++) {
         const es_material_desc* m = &list->materials[list->instances[i].material];
@@ -191,18 +196,30 @@ es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
         es_lamps_free_planes(r->context, &r->lamps);
         return pass_filter(r, why);
     }
-    r->lamps.has_specular = anything_specular(in->list);
+    r->lamps.has_specular = es_lamps_anything_specular(in->solid);
     es_plan_begin(plan, ES_PASS_LAMP_LIGHT);
     const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
     const float numbers[] = {s->lamp_slope_bias, s->lamp_roughness, (float)s->lamp_interleave, in->extent, r->lamps.has_specular, (float)s->lamps, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {
-        es_result result = shade(r, in);
+        const es_lit_surfaces picture = picture_of(r);
+        es_result result = shade(r, &picture, shaded_count(r), s->screen_repair != 0, &r->lamps.irradiance, &r->lamps.specular);
         if (result) return result;
         es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * shaded_count(r) / (s->lamp_interleave * s->lamp_interleave));
     }
     return pass_filter(r, NULL);
+}
+
+/* Screen space knows nothing of what stands before the picture: the environment's light comes from the set there, whatever lights the picture. */
+es_result es_lamps_light_layer(es_renderer* r, const es_lit_surfaces* of, es_layer_light* light)
+{
+    es_result result = shade(r, of, r->lamps.set.shaded_count, false, &light->irradiance, &light->specular);
+    light->lobes = of->lobes;
+    light->filtered = !unfiltered(&r->frame.settings);
+    light->filtered_lobes = light->filtered && of->lobes;
+    if (!result && light->filtered) result = filter(r, of, &light->irradiance, &light->specular, &light->filtered_irradiance, &light->filtered_specular);
+    return result;
 }
 
 void es_lamps_compose(const es_renderer* r, es_compose_job* job)

@@ -15,6 +15,10 @@ es_result es_pass_lamp_maps(es_renderer* renderer, const es_frame_inputs* in);
 es_result es_pass_lamp_light(es_renderer* renderer, const es_frame_inputs* in);
 /* For es_shade_at_points, without pixels: of the frame that is being, or was last, rendered. */
 es_shade_job es_lamps_at_points(const es_renderer* renderer);
+/* The same light on a blended layer; the lights' set and maps are there. */
+es_result es_lamps_light_layer(es_renderer* renderer, const es_lit_surfaces* surfaces, es_layer_light* light);
+/* May something of the list reflect lamps' light otherwise than evenly? */
+bool es_lamps_anything_specular(const es_draw_list* list);
 /* Sets the planes of lamps' light. */
 void es_lamps_compose(const es_renderer* renderer, es_compose_job* job);
 void es_lamps_free_planes(es_context* context, es_lamp_light* lamps);

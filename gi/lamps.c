@@ -70,7 +70,7 @@ static void point_on(const float corner[3][2], float a, float b, float* u, float
 
 static uint32_t packed(float u, float v) { return (uint32_t)(es_clampf(u, 0, 1) * 65535.0f + 0.5f) | (uint32_t)(es_clampf(v, 0, 1) * 65535.0f + 0.5f) << 16; }
 
-static bool varies(const es_material_desc* m) { return m->emission_texture.image || m->alpha_mask; }
+static bool varies(const es_material_desc* m) { return m->emission_texture.image || m->alpha_mask || m->blend; }
 
 static void measure_radiance(const es_raster_mesh* mesh, const es_material_desc* m, lamp_cell* cell)
 {
@@ -81,7 +81,7 @@ static void measure_radiance(const es_raster_mesh* mesh, const es_material_desc*
     es_vec3 sum = es_v3(0, 0, 0);
     for (uint32_t i = 0; i < TAPS * TAPS; i++) {
         point_on((const float(*)[2])corner, ((float)(i % TAPS) + 0.5f) / TAPS, ((float)(i / TAPS) + 0.5f) / TAPS, &u, &v);
-        if (m->alpha_mask && es_surfel_read(mesh, m, cell->triangle, packed(u, v)).hole) continue;
+        if ((m->alpha_mask || m->blend) && es_surfel_read(mesh, m, cell->triangle, packed(u, v)).hole) continue;
         sum = es_v3_add(sum, es_surfel_emission(mesh, m, cell->triangle, packed(u, v)));
     }
     cell->radiance[0] = sum.x * (1.0f / (TAPS * TAPS));

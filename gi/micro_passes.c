@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/blend_passes.h"
 #include "gi/bounce_pass.h"
 #include "gi/indirect.h"
 #include "gi/lamp_passes.h"
@@ -196,41 +197,41 @@ static es_result gather(es_renderer* r, es_micro_pixels* pixels, es_planes* plan
     return es_micro_gather_pixels(r->context, &r->arena, &r->micro.forest, &settings, pixels, &r->micro.stats, gathered);
 }
 
-static es_result gather_sparsely(es_renderer* r, uint32_t kind, uint32_t spacing, es_planes* planes, uint64_t* gathered)
+static es_result gather_sparsely(es_renderer* r, const es_micro_pixels* of, uint32_t spacing, es_planes* planes, uint64_t* gathered)
 {
-    const uint32_t width = es_micro_sparse(r->gbuffer.width, spacing), height = es_micro_sparse(r->gbuffer.height, spacing);
+    const uint32_t width = es_micro_sparse(of->gbuffer->width, spacing), height = es_micro_sparse(of->gbuffer->height, spacing);
     const es_gbuffer size = {.width = width, .height = height, .stride = (width + 7) / 8 * 8};
     es_result result = es_planes_resize(r->context, planes, &size);
     if (result) return result;
-    es_micro_pixels pixels = pixels_of(r, kind);
+    es_micro_pixels pixels = *of;
     pixels.spacing = spacing;
     pixels.stride = size.stride;
     return gather(r, &pixels, planes, gathered);
 }
 
-static es_result gather_fully(es_renderer* r, uint32_t kind, es_planes* planes, uint64_t* gathered)
+static es_result gather_fully(es_renderer* r, const es_micro_pixels* of, es_planes* planes, uint64_t* gathered)
 {
-    es_micro_pixels pixels = pixels_of(r, kind);
-    pixels.stride = r->gbuffer.stride;
-    pixels.lit = kind == ES_GATHER_LOBE ? planes->lit : NULL;
+    es_micro_pixels pixels = *of;
+    pixels.stride = of->gbuffer->stride;
+    pixels.lit = of->kind == ES_GATHER_LOBE ? planes->lit : NULL;
     return gather(r, &pixels, planes, gathered);
 }
 
-static es_result interpolate(es_renderer* r, uint32_t kind, uint32_t spacing, const es_planes* sparse, es_planes* planes, uint64_t* gathered)
+static es_result interpolate(es_renderer* r, const es_micro_pixels* of, uint32_t spacing, const es_planes* sparse, es_planes* planes, uint64_t* gathered)
 {
-    const es_gbuffer* g = &r->gbuffer;
+    const es_gbuffer* g = of->gbuffer;
     const size_t bytes = (size_t)es_micro_list_stride(g->width) * g->height;
     uint8_t* listed = es_allocate(r->context, bytes);
     if (!listed) return es_context_last_result(r->context);
     const uint32_t width = es_micro_sparse(g->width, spacing);
-    es_micro_upsample_job job = {.gbuffer = g, .rays = r->rays, .kind = kind, .spacing = spacing, .sparse_width = width, .sparse_height = es_micro_sparse(g->height, spacing), .sparse_stride = (width + 7) / 8 * 8,
-        .lit = kind == ES_GATHER_LOBE ? planes->lit : NULL, .listed = listed};
+    es_micro_upsample_job job = {.gbuffer = g, .rays = of->rays, .kind = of->kind, .spacing = spacing, .sparse_width = width, .sparse_height = es_micro_sparse(g->height, spacing), .sparse_stride = (width + 7) / 8 * 8,
+        .lit = of->kind == ES_GATHER_LOBE ? planes->lit : NULL, .listed = listed};
     for (int k = 0; k < 3; k++) {
         job.source[k] = sparse->at[k];
         job.result[k] = planes->at[k];
     }
     es_micro_upsample(r->context, &job);
-    es_micro_pixels pixels = pixels_of(r, kind);
+    es_micro_pixels pixels = *of;
     pixels.listed = listed;
     pixels.stride = g->stride;
     es_result result = gather(r, &pixels, planes, gathered);
@@ -274,21 +275,42 @@ static es_result gather_all(es_renderer* r, es_planes* irradiance, es_planes* sp
         es_planes_free(r->context, &r->micro.sparse_specular);
         r->micro.spacing = s->micro_spacing;
     }
+    const es_micro_pixels diffuse = pixels_of(r, ES_GATHER_DIFFUSE), lobe = pixels_of(r, ES_GATHER_LOBE);
     if (s->micro_spacing == 1) {
-        if (!result) result = gather_fully(r, ES_GATHER_DIFFUSE, irradiance, &gathered);
-        if (!result && r->has_specular) result = gather_fully(r, ES_GATHER_LOBE, specular, &gathered);
+        if (!result) result = gather_fully(r, &diffuse, irradiance, &gathered);
+        if (!result && r->has_specular) result = gather_fully(r, &lobe, specular, &gathered);
         return result;
     }
-    if (!result) result = gather_sparsely(r, ES_GATHER_DIFFUSE, s->micro_spacing, &r->micro.sparse_irradiance, &gathered);
-    if (!result && r->has_specular) result = gather_sparsely(r, ES_GATHER_LOBE, lobe_spacing(s), &r->micro.sparse_specular, &gathered);
+    if (!result) result = gather_sparsely(r, &diffuse, s->micro_spacing, &r->micro.sparse_irradiance, &gathered);
+    if (!result && r->has_specular) result = gather_sparsely(r, &lobe, lobe_spacing(s), &r->micro.sparse_specular, &gathered);
     return result;
 }
 
 static es_result fill(es_renderer* r, es_planes* irradiance, es_planes* specular, uint64_t* gathered)
 {
     const es_renderer_settings* s = &r->frame.settings;
-    es_result result = interpolate(r, ES_GATHER_DIFFUSE, s->micro_spacing, &r->micro.sparse_irradiance, irradiance, gathered);
-    if (!result && r->has_specular) result = interpolate(r, ES_GATHER_LOBE, lobe_spacing(s), &r->micro.sparse_specular, specular, gathered);
+    const es_micro_pixels diffuse = pixels_of(r, ES_GATHER_DIFFUSE), lobe = pixels_of(r, ES_GATHER_LOBE);
+    es_result result = interpolate(r, &diffuse, s->micro_spacing, &r->micro.sparse_irradiance, irradiance, gathered);
+    if (!result && r->has_specular) result = interpolate(r, &lobe, lobe_spacing(s), &r->micro.sparse_specular, specular, gathered);
+    return result;
+}
+
+es_result es_micro_light_layer(es_renderer* r, const es_lit_surfaces* of, es_layer_light* light)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    uint64_t gathered = 0;
+    es_result result = es_planes_resize(r->context, &light->irradiance, of->gbuffer);
+    if (!result && of->lobes) result = es_planes_resize(r->context, &light->specular, of->gbuffer);
+    for (uint32_t kind = 0; kind < 2 && !result; kind++) {
+        const bool lobe = kind == 1;
+        if (lobe && !of->lobes) continue;
+        const es_micro_pixels pixels = {.gbuffer = of->gbuffer, .rays = of->rays, .kind = lobe ? ES_GATHER_LOBE : ES_GATHER_DIFFUSE, .spacing = 1, .seed = es_hash_u32(0) + s->seed};
+        es_planes *sparse = lobe ? &light->sparse_specular : &light->sparse_irradiance, *planes = lobe ? &light->specular : &light->irradiance;
+        const uint32_t spacing = lobe ? lobe_spacing(s) : s->micro_spacing;
+        if (spacing == 1) result = gather_fully(r, &pixels, planes, &gathered);
+        else result = gather_sparsely(r, &pixels, spacing, sparse, &gathered);
+        if (!result && spacing > 1) result = interpolate(r, &pixels, spacing, sparse, planes, &gathered);
+    }
     return result;
 }
 
@@ -302,7 +324,7 @@ es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
         es_plan_not_needed(plan, ES_PASS_MICRO, why);
         return ES_OK;
     }
-    r->has_specular = es_frame_has_lobes(r, in->list);
+    r->has_specular = es_frame_has_lobes(r, in->solid);
     const bool several = accumulates(r);
     r->micro.turn = turn_of(r);
     es_planes *irradiance = several ? &r->micro.fresh_irradiance : &r->irradiance, *specular = several ? &r->micro.fresh_specular : &r->specular;
@@ -353,9 +375,10 @@ es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* in
     es_indirect_planes light;
     memset(&light, 0, sizeof light);
     const es_planes *irradiance = &r->irradiance, *specular = &r->specular;
-    es_planes filtered = {0}, none = {0};
+    es_planes filtered = {0}, none = {0}, layers = {0};
     if (bounces < es_micro_bounces(r)) {
         result = light_points(r, bounces);
+        if (!result) result = es_blend_bounded(r, 0, &layers);
         if (!result) result = gather_all(r, &light.irradiance, &light.specular);
         uint64_t afresh = 0;
         if (!result && r->frame.settings.micro_spacing > 1) result = fill(r, &light.irradiance, &light.specular, &afresh);
@@ -374,9 +397,11 @@ es_result es_micro_first_bounces(es_renderer* r, uint32_t bounces, es_planes* in
         job.irradiance[k] = irradiance->at[k];
         job.specular[k] = r->has_specular ? specular->at[k] : NULL;
         job.indirect[k] = indirect->at[k];
+        if (layers.memory) job.layers.bounded[k] = layers.at[k];
     }
     if (!result) es_compose(r->context, &job);
     es_indirect_planes_free(r->context, &light);
     es_planes_free(r->context, &filtered);
+    es_planes_free(r->context, &layers);
     return result;
 }

@@ -22,6 +22,8 @@ bool es_micro_wants_photons(const es_renderer_settings* settings);
 es_result es_pass_points(es_renderer* renderer, const es_frame_inputs* in);
 /* Gathering and interpolation. */
 es_result es_pass_micro(es_renderer* renderer, const es_frame_inputs* in);
+/* Gathering and interpolation for a blended layer; the points are lit. Its buffers are turned as those of a single picture are, over frames as well. */
+es_result es_micro_light_layer(es_renderer* renderer, const es_lit_surfaces* surfaces, es_layer_light* light);
 /* Of the last frame: how many bounces its light has, and the reflected light of the first so many, without that of frames before; the points are lit again
  * for it. With emission, what glows is seen by the first. */
 uint32_t es_micro_bounces(const es_renderer* renderer);

@@ -40,6 +40,8 @@
     X(SCREEN_OCCLUSION, "screen-space occlusion", "samples")                                                     \
     X(SCREEN_BOUNCE, "screen-space bounce", "samples")                                                           \
     X(RESIDUAL, "screen-space compensation", "samples")                                                          \
+    X(BLEND_LAYERS, "blended layers", "triangles")                                                               \
+    X(BLEND_LIGHT, "light of blended layers", "pixels")                                                          \
     X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \
     X(COMPOSE, "compose", "pixels")
 

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "gi/blend_passes.h"
 #include "gi/bounce_pass.h"
 #include "gi/classic.h"
 #include "gi/direct.h"
@@ -116,6 +117,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->filtered_irradiance);
     es_planes_free(context, &renderer->filtered_specular);
     es_screen_buffers_free(context, &renderer->screen);
+    es_blend_layers_free(context, &renderer->blend);
 }
 
 void es_renderer_destroy(es_renderer* renderer)
@@ -139,6 +141,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_trace_scene_free(&renderer->trace_scene);
     es_micro_free(context, &renderer->micro);
     es_environment_map_free(context, &renderer->environment);
+    es_blend_lists_free(context, &renderer->lists);
     es_arena_free(&renderer->arena);
     if (renderer->rasterizer) es_rasterizer_destroy(renderer->rasterizer);
     es_release(context, renderer, sizeof *renderer);
@@ -214,14 +217,19 @@ static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
     uint64_t moving = in->revisions.moving ? in->revisions.steps : 0;
     es_plan_reads(&r->plan, &moving, sizeof moving);
     es_plan_reads(&r->plan, &in->has_environment, sizeof in->has_environment); /* which moves as well, see es_background_job */
-    const bool layers = r->settings.screen_layers > 1;
+    const bool layers = r->settings.screen_layers > 1, blended = in->layers->instance_count > 0;
     es_plan_reads(&r->plan, &layers, sizeof layers);
+    if (blended) es_plan_reads(&r->plan, &blended, sizeof blended);
+    /* without layers blended surfaces are masked ones */
+    const bool masked = r->settings.blend_layers == 0;
+    es_plan_reads(&r->plan, &masked, sizeof masked);
     if (!es_plan_run(&r->plan, ES_PASS_VISIBILITY)) return ES_OK;
     es_result result = r->settings.temporal ? es_history_keep(r->context, &r->gbuffer, &r->history.gbuffer) : ES_OK;
     es_depth_range range;
     const es_depth_range* wanted = NULL;
     if (!result) result = es_screen_first_layer(r, &range, &wanted);
-    if (!result) result = es_draw_gbuffer_between(r->rasterizer, in->list, &r->view, wanted, &r->gbuffer, &r->stats.raster);
+    if (!result && blended && !wanted) result = es_blend_behind(r, &range, &wanted);
+    if (!result) result = es_draw_gbuffer_between(r->rasterizer, in->solid, &r->view, wanted, &r->gbuffer, &r->stats.raster);
     if (!result) es_plan_done(&r->plan, ES_PASS_VISIBILITY, r->stats.raster.triangles);
     return result;
 }
@@ -492,6 +500,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     job.lit = specular->lit;
     es_lamps_compose(r, &job);
     es_screen_compose(r, &job);
+    es_blend_compose(r, &job);
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_BACKGROUND]) job.background[k] = r->background.at[k];
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
@@ -524,6 +533,7 @@ static void pass_compose(es_renderer* r)
     es_screen_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_RESIDUAL);
     es_plan_reads_pass(plan, ES_PASS_SECOND_ORDER);
+    es_plan_reads_pass(plan, ES_PASS_BLEND_LIGHT);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -568,6 +578,8 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_screen_occlusion(r, in);
     if (!result) result = es_pass_screen_bounce(r, in);
     if (!result) result = es_pass_residual(r, in);
+    if (!result) result = es_pass_blend_layers(r, in);
+    if (!result) result = es_pass_blend_light(r, in);
     return result ? result : es_pass_antialias(r, picture);
 }
 
@@ -593,7 +605,9 @@ static es_result render(es_renderer* r, es_world* world)
     if (result) return result;
     result = es_world_camera_view(world, camera, r->settings.width, r->settings.height, &r->view);
     if (result) return result;
-    es_frame_inputs in = {.list = es_world_draw_list(world), .revisions = es_world_get_revisions(world)};
+    result = es_blend_lists_make(r->context, &r->lists, es_world_draw_list(world), r->settings.blend_layers > 0);
+    if (result) return result;
+    es_frame_inputs in = {.list = &r->lists.light, .solid = &r->lists.solid, .layers = &r->lists.layers, .revisions = es_world_get_revisions(world)};
     size_t light_count;
     in.lights = es_world_lights(world, &light_count);
     in.light_count = (uint32_t)light_count;

@@ -2,6 +2,7 @@
 #ifndef EARTHSHINE_GI_RENDERER_H
 #define EARTHSHINE_GI_RENDERER_H
 
+#include "gi/blend_lists.h"
 #include "gi/compose.h"
 #include "gi/environment.h"
 #include "gi/filter.h"
@@ -9,6 +10,7 @@
 #include "gi/history.h"
 #include "gi/ism.h"
 #include "gi/lamps.h"
+#include "gi/layer_light.h"
 #include "gi/light_view.h"
 #include "gi/micro/light.h"
 #include "gi/micro/micro.h"
@@ -52,6 +54,9 @@ typedef struct es_second_order_buffers {
     es_gbuffer half;
     es_planes half_positive, half_negative;
     es_planes taken, negative;
+    es_open_light* lights;     /* of this frame: the positive ones, then the negative ones */
+    size_t light_capacity;
+    uint32_t positive_count, negative_count;
 } es_second_order_buffers;
 
 /* What bias compensation in screen space gathers from, and what it found (gi/screen/residual_pass.h). */
@@ -100,6 +105,8 @@ struct es_renderer {
     es_planes background;      /* the environment where nothing is seen; kept while there is one */
     es_environment_map environment; /* valid when the pass is */
     es_screen_buffers screen;
+    es_blend_lists lists;      /* of the frame that is being rendered */
+    es_blend_layers blend;
 
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;
@@ -119,7 +126,7 @@ struct es_renderer {
 
 /* What a frame is made from, and why some of it is not. */
 typedef struct es_frame_inputs {
-    const es_draw_list* list;
+    const es_draw_list *list, *solid, *layers; /* what light meets; what the camera sees, but for the last: blended surfaces (gi/blend_lists.h) */
     const es_light_state* lights;
     uint32_t light_count;
     es_world_revisions revisions;
@@ -147,6 +154,8 @@ es_result es_pass_compensation(es_renderer* renderer, const es_frame_inputs* in)
 es_result es_history_begin(es_renderer* renderer, const es_frame_inputs* in, const es_world* world);
 void es_history_end(es_history* history); /* the frame is complete */
 void es_history_free(es_context* context, es_history* history);
+/* Hash of all settings but what changes no result, or the display only. */
+uint64_t es_history_settings(const es_renderer_settings* settings);
 /* Before `drawn` is drawn anew: what it holds goes to `last`. */
 es_result es_history_keep(es_context* context, es_gbuffer* drawn, es_gbuffer* last);
 es_result es_pass_temporal(es_renderer* renderer, const es_frame_inputs* in);

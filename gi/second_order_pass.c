@@ -10,6 +10,9 @@ void es_second_order_free(es_context* context, es_second_order_buffers* b)
     es_gbuffer_destroy(context, &b->half);
     es_planes* const planes[] = {&b->half_positive, &b->half_negative, &b->taken, &b->negative};
     for (size_t i = 0; i < sizeof planes / sizeof planes[0]; i++) es_planes_free(context, planes[i]);
+    es_release(context, b->lights, b->light_capacity * sizeof *b->lights);
+    b->lights = NULL;
+    b->light_capacity = 0;
 }
 
 /* At one pixel of 2 × 2. */
@@ -50,17 +53,19 @@ static es_result light(es_renderer* r, const es_frame_inputs* in, uint64_t* whol
     const es_gbuffer* g = &r->gbuffer;
     const size_t list_bytes = (size_t)((g->width + 7) / 8) * g->height;
     es_arena_reset(&r->arena);
-    es_open_light* positive = es_arena_allocate(&r->arena, ((size_t)r->vpl_count + 1) * sizeof *positive);
+    if (!es_grow(r->context, (void**)&b->lights, &b->light_capacity, 0, (size_t)r->vpl_count + s->second_negative + 1, sizeof *b->lights)) return es_context_last_result(r->context);
+    es_open_light *const positive = b->lights, *const negative = positive + r->vpl_count;
     es_open_light* tries = es_arena_allocate(&r->arena, ((size_t)s->second_negative * ES_NEGATIVE_TRIES + 1) * sizeof *tries);
-    es_open_light* negative = es_arena_allocate(&r->arena, ((size_t)s->second_negative + 1) * sizeof *negative);
     uint8_t* listed = es_arena_allocate(&r->arena, list_bytes);
-    if (!positive || !tries || !negative || !listed) return es_context_last_result(r->context);
+    if (!tries || !listed) return es_context_last_result(r->context);
     const float bound = es_geometry_bound(s, in), spread = es_vpl_spread(s);
     for (uint32_t i = 0; i < r->vpl_count; i++) positive[i] = es_open_light_of(&r->vpls[i], spread);
     const es_negative_job place = {.gbuffer = g, .rays = r->rays, .lights = positive, .light_count = r->vpl_count, .count = s->second_negative, .seed = s->seed, .bound = bound, .spread = spread};
     uint32_t negative_count = 0;
+    b->positive_count = r->vpl_count;
     if (s->second_negative) es_negative_lights_place(r->context, &place, tries, negative, &negative_count);
 
+    b->negative_count = negative_count;
     const es_open_job adds = {.lights = positive, .light_count = r->vpl_count, .bound = bound}, takes = {.lights = negative, .light_count = negative_count, .bound = bound};
     es_result result = es_gbuffer_halve(r->context, g, &b->half);
     if (!result) result = shade_half(r, &adds, &b->half_positive);
@@ -88,6 +93,31 @@ static es_result light(es_renderer* r, const es_frame_inputs* in, uint64_t* whol
         reflect.bounded[k] = b->negative.at[k];
     }
     es_compose(r->context, &reflect);
+    return ES_OK;
+}
+
+es_result es_second_order_light_layer(es_renderer* r, const es_lit_surfaces* of, es_layer_light* light)
+{
+    const es_renderer_settings* s = &r->frame.settings;
+    const es_second_order_buffers* b = &r->second_order;
+    const float bound = es_geometry_bound(s, &(es_frame_inputs){.extent = r->frame.extent});
+    es_result result = es_planes_resize(r->context, &light->irradiance, of->gbuffer);
+    if (!result) result = es_planes_resize(r->context, &light->sparse_irradiance, of->gbuffer);
+    if (result) return result;
+    es_open_job adds = {.gbuffer = of->gbuffer, .rays = of->rays, .lights = b->lights, .light_count = b->positive_count, .bound = bound}, takes = adds;
+    takes.lights = b->lights + b->positive_count;
+    takes.light_count = b->negative_count;
+    for (int k = 0; k < 3; k++) {
+        adds.irradiance[k] = light->irradiance.at[k];
+        takes.irradiance[k] = light->sparse_irradiance.at[k];
+    }
+    es_open_shade(r->context, &adds);
+    es_open_shade(r->context, &takes);
+    const float* const there[3] = {light->irradiance.at[0], light->irradiance.at[1], light->irradiance.at[2]};
+    es_open_subtract(r->context, of->gbuffer, light->sparse_irradiance.at, there);
+    for (int k = 0; k < 3; k++)
+        for (size_t y = 0; y < of->gbuffer->height; y++)
+            for (size_t x = 0; x < of->gbuffer->width; x++) light->irradiance.at[k][y * of->gbuffer->stride + x] += light->sparse_irradiance.at[k][y * of->gbuffer->stride + x];
     return ES_OK;
 }
 

@@ -1,5 +1,6 @@
 /* The renderer's settings: names, ranges, defaults. What a number means and where it comes from stands in gi.h. */
 #include "gi/gi.h"
+#include "gi/layer_light.h"
 #include "gi/screen/residual.h"
 #include "platform/settings.h"
 
@@ -104,6 +105,8 @@ static const es_setting renderer_table[] = {
     {"screen.repair", ES_SETTING_INT, "0", 0, 64, NULL, "places towards each light that are tested for what the depth bias of its shadow map leaves out; 0: none", AT(screen_repair)},
     {"screen.repair-least", ES_SETTING_FLOAT, "0", 0, 1, NULL, "screen.repair: how far away from the pixel these places reach at least, share of the scene's extent; 0: as far as the bias", AT(screen_repair_least)},
     {"screen.bounce", ES_SETTING_BOOL, "false", 0, 1, NULL, "light that surfaces within screen.radius send each other, from half as many places: what vpl.bound, then 1 / radius² at the most, leaves out (vpl.spread is 0 then), with gi none all of it; not with gi micro", AT(screen_bounce)},
+
+    {"blend.layers", ES_SETTING_INT, "4", 0, ES_BLEND_MAX_LAYERS, NULL, "blended surfaces in front of the picture that are peeled from it, lit and composited; of more the nearest; 0: they are drawn as masked", AT(blend_layers)},
 
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},

@@ -64,7 +64,7 @@ es_surfel_words es_surfel_read(const es_raster_mesh* mesh, const es_material_des
         es_trace_sample_texture(&m->specular_texture, uvs, texel);
         specular *= texel[3];
     }
-    const bool hole = m->alpha_mask && color[3] < m->alpha_cutoff;
+    const bool hole = (m->alpha_mask || m->blend) && color[3] < m->alpha_cutoff;
     const uint32_t second = es_pack_unorm8(m->model == ES_SURFACE_PHONG ? m->exponent * (5.0f / 255.0f) : roughness), model = hole ? ES_SURFACE_UNLIT : (uint32_t)m->model;
     return (es_surfel_words){
         .albedo_rg = es_pack_unorm16(color[0]) | es_pack_unorm16(color[1]) << 16,

@@ -9,8 +9,7 @@
 
 /* ---- going on ----------------------------------------------------------------------------------------------------------- */
 
-/* Of all settings but what changes no result, or the display only. */
-static uint64_t settings_hash(const es_renderer_settings* settings)
+uint64_t es_history_settings(const es_renderer_settings* settings)
 {
     static const char* const others[] = {"skip", "exposure", "white", "tone-map"};
     uint64_t hash = 0;
@@ -86,7 +85,7 @@ es_result es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_w
     double origin[3];
     es_world_origin(world, origin);
     const uint32_t camera = es_world_active_camera(world).id;
-    const uint64_t settings = settings_hash(s);
+    const uint64_t settings = es_history_settings(s);
     const es_world_revisions* now = &in->revisions;
     const uint64_t steps = now->steps - h->revisions.steps;
     const es_mat4 last_view = moved_view(h->view.view, h->origin, origin), last_projection = h->view.projection;

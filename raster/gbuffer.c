@@ -7,7 +7,8 @@ es_result es_gbuffer_create(es_context* context, uint32_t width, uint32_t height
     *gbuffer = (es_gbuffer){0};
     if (width < 1 || height < 1 || width > ES_RASTER_MAX_SIZE || height > ES_RASTER_MAX_SIZE)
         return es_misuse(context, ES_IMAGE_SIZE, "a G-buffer of %u x %u pixels; 1 to %d each way are supported", width, height, ES_RASTER_MAX_SIZE);
-    if (!planes || (planes & ~(uint32_t)ES_GBUFFER_ALL)) return es_misuse(context, ES_INVALID_ARGUMENT, "G-buffer planes %#x; one or more of %#x are accepted", planes, ES_GBUFFER_ALL);
+    const uint32_t known = (uint32_t)ES_GBUFFER_ALL | (uint32_t)ES_GBUFFER_ALPHA;
+    if (!planes || (planes & ~known)) return es_misuse(context, ES_INVALID_ARGUMENT, "G-buffer planes %#x; one or more of %#x are accepted", planes, known);
     es_gbuffer g = {.width = width, .height = height, .stride = (width + 7) / 8 * 8, .planes = planes};
     void** slots[12];
     int count = 0;
@@ -20,6 +21,7 @@ es_result es_gbuffer_create(es_context* context, uint32_t width, uint32_t height
     if (planes & ES_GBUFFER_MOTION) slots[count++] = (void**)&g.motion_x, slots[count++] = (void**)&g.motion_y;
     if (planes & ES_GBUFFER_INSTANCE) slots[count++] = (void**)&g.instance;
     if (planes & ES_GBUFFER_TRIANGLE) slots[count++] = (void**)&g.triangle;
+    if (planes & ES_GBUFFER_ALPHA) slots[count++] = (void**)&g.alpha;
     /* Planes a multiple of 4096 bytes apart would fall into the same cache sets, and eleven are written side by side. */
     size_t plane = ((size_t)g.stride * height * 4 + 63) / 64 * 64;
     if (plane % 4096 < 256 || plane % 4096 > 4096 - 256) plane += 5 * 64 + 256;

@@ -35,7 +35,7 @@ static es_prepared_material prepare_material(const es_material_desc* desc)
     for (int i = 0; i < 3; i++) m.emission[i] = clamp_finite(desc->emission[i], 0, 1e30f);
     m.normal_scale = desc->normal_scale;
     m.alpha_cutoff = desc->alpha_cutoff;
-    m.alpha_mask = desc->alpha_mask;
+    m.alpha_mask = desc->alpha_mask || desc->blend;
     m.double_sided = desc->double_sided;
     m.model = (uint32_t)desc->model;
     uint32_t second = desc->model == ES_SURFACE_PHONG ? (uint32_t)(m.exponent * 5 + 0.5f) : es_pack_unorm8(m.roughness);

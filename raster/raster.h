@@ -62,7 +62,7 @@ typedef enum es_surface_model {
 
 typedef struct es_material_desc {
     es_surface_model model;
-    float base_color[4];      /* linear; alpha is used by the mask only; default 1 1 1 1 */
+    float base_color[4];      /* linear; alpha is used by `alpha_mask` and `blend` only; default 1 1 1 1 */
     float metallic;           /* 0 … 1; default 0 */
     float roughness;          /* 0 … 1; default 1 */
     float specular;           /* METALLIC_ROUGHNESS: weight of the dielectric Fresnel term, 0 is Lambert; PHONG: lobe albedo; 0 … 1; default 1 */
@@ -71,8 +71,12 @@ typedef struct es_material_desc {
     float normal_scale;       /* default 1 */
     bool alpha_mask;          /* fragments with alpha < alpha_cutoff are not drawn */
     float alpha_cutoff;       /* default 0.5 */
+    /* What is behind shows through: C = alpha · this + (1 - alpha) · behind, alpha being that of base colour × texture × vertex colour, cut to 0 … 1. Only a renderer's
+     * camera and the reference's see it so (es_renderer_settings.blend_layers); whatever is drawn here, and light that meets the surface on its way, take it as
+     * if it had alpha_mask: it casts shadows and sends light on where alpha is alpha_cutoff or more, and elsewhere is not there. */
+    bool blend;
     bool double_sided;
-    es_texture_use base_color_texture;          /* rgb * base_color, alpha for the mask */
+    es_texture_use base_color_texture;          /* rgb * base_color, alpha for `alpha_mask` and `blend` */
     es_texture_use metallic_roughness_texture;  /* g roughness, b metallic */
     es_texture_use normal_texture;              /* tangent space, rgb * 2 - 1 */
     es_texture_use emission_texture;
@@ -131,7 +135,7 @@ ES_API void es_cube_views(uint32_t size, es_vec3 eye, float near_plane, es_raste
 /* ---- G-buffer -------------------------------------------------------------------------------------------------------------------------- */
 
 /* Attributes of the visible surface per pixel, one plane each, rows of `stride` pixels (a multiple of eight, padding
- * undefined). 40 bytes a pixel with all planes. Where nothing is seen, depth is 0 and the other planes are 0. */
+ * undefined). 40 bytes a pixel with ALL planes. Where nothing is seen, depth is 0 and the other planes are 0. */
 typedef enum es_gbuffer_plane {
     ES_GBUFFER_DEPTH = 1 << 0,            /* float: distance along the view axis, metres */
     ES_GBUFFER_NORMAL = 1 << 1,           /* world shading normal (normal map applied), octahedral, two signed 16-bit: x low */
@@ -142,7 +146,8 @@ typedef enum es_gbuffer_plane {
     ES_GBUFFER_MOTION = 1 << 6,           /* two floats: pixel position now minus last frame's (Knecht §3.5.1), x then y plane; 65536 each where it was behind the eye */
     ES_GBUFFER_INSTANCE = 1 << 7,         /* instance id + 1 */
     ES_GBUFFER_TRIANGLE = 1 << 8,         /* triangle index in its mesh + 1 */
-    ES_GBUFFER_ALL = (1 << 9) - 1
+    ES_GBUFFER_ALL = (1 << 9) - 1,
+    ES_GBUFFER_ALPHA = 1 << 9             /* float: the material's alpha, 0 … 1, of blended surfaces or not; for layers of blended ones, not among ALL */
 } es_gbuffer_plane;
 
 typedef struct es_gbuffer {
@@ -150,7 +155,7 @@ typedef struct es_gbuffer {
     uint32_t planes;                       /* which exist; the others are NULL and not computed */
     float* depth;
     uint32_t *normal, *geometric_normal, *albedo_rg, *albedo_b, *surface, *emission, *instance, *triangle;
-    float *motion_x, *motion_y;
+    float *motion_x, *motion_y, *alpha;
     void* memory;
     size_t memory_bytes;
 } es_gbuffer;

@@ -207,9 +207,9 @@ struct geometry {
 
 /* What is warned of once per file, after it was read. */
 struct left_out {
-    size_t lines_and_points = 0, partial_triangles = 0, blended = 0, sheared = 0;
+    size_t lines_and_points = 0, partial_triangles = 0, sheared = 0;
     size_t tinted_specular = 0, specular_textures = 0, sourceless_textures = 0, uv_sets = 0, dropped_channels = 0, dropped_pointers = 0, weightless = 0;
-    std::string blended_name, sheared_name, pointer_name;
+    std::string sheared_name, pointer_name;
     bool light = false, camera = false; /* and was added */
 };
 
@@ -1028,8 +1028,7 @@ class importer
             desc.alpha_mask = true;
             desc.alpha_cutoff = number(from.alphaCutoff, 0.0, 1e9, where + ".alphaCutoff");
         } else if (from.alphaMode == "BLEND") {
-            desc.alpha_mask = true;
-            if (left.blended++ == 0) { left.blended_name = from.name.empty() ? where : shown(from.name); }
+            desc.blend = true;
         } else if (from.alphaMode != "OPAQUE") {
             refuse(ES_FILE_DAMAGED, "%s.alphaMode: is '%s', must be OPAQUE, MASK or BLEND", where.c_str(), shown(from.alphaMode).c_str());
         }
@@ -1965,9 +1964,6 @@ class importer
         if (left.weightless) { warn("%zu animation channels of morph weights are left out, no mesh of the scene has such targets", left.weightless); }
         if (left.dropped_pointers) {
             warn("%zu animated properties are none of those that are animated here, they are left out (the first: %s)", left.dropped_pointers, left.pointer_name.c_str());
-        }
-        if (left.blended) {
-            warn("%zu blended materials are drawn as masked, where alpha is at least 0.5 (the first: %s)", left.blended, left.blended_name.c_str());
         }
         if (left.tinted_specular) { warn("%zu materials have a specular colour, of which only the luminance up to 1 is used", left.tinted_specular); }
         if (left.specular_textures) { warn("%zu specular colour textures are left out", left.specular_textures); }

@@ -348,6 +348,54 @@ static void check_micro_upsample(void** state)
     }
 }
 
+/* Any transmittance and alpha, 0 and 1 among them; what the layer does not cover may hold anything and stays as it is. */
+static void check_blend(void** state)
+{
+    (void)state;
+    for (int trial = 0; trial < 60; trial++) {
+        const uint32_t columns = 8 + 8 * (random_bits() % 9), rows = 1 + random_bits() % 40, stride = columns + 8 * (random_bits() % 3);
+        const size_t floats = (size_t)stride * rows;
+        plane alpha = new_plane(floats), layer[3], expected[4], result[4];
+        for (size_t i = 0; i < floats; i++) at(alpha)[i] = random_bits() % 3 ? uniform(0, 1) : random_bits() % 2 ? 0.0f : 1.0f;
+        for (int k = 0; k < 3; k++) {
+            layer[k] = new_plane(floats);
+            for (size_t i = 0; i < floats; i++) at(layer[k])[i] = at(alpha)[i] > 0 ? uniform(0, 1e6f) : NAN;
+        }
+        for (int k = 0; k < 4; k++) {
+            expected[k] = new_plane(floats);
+            result[k] = new_plane(floats);
+            for (size_t i = 0; i < floats; i++) at(expected[k])[i] = uniform(0, 1);
+        }
+        es_blend_job job = {.alpha = at(alpha), .through = trial % 3 != 0, .columns = columns, .rows = rows, .stride = stride};
+        for (int k = 0; k < 3 && trial % 5; k++) job.layer[k] = at(layer[k]);
+        for (int isa = ES_ISA_SCALAR; isa < ES_ISA_COUNT; isa++) {
+            if (!(es_isa_available_mask() >> isa & 1)) continue;
+            for (int k = 0; k < 4; k++) memcpy(at(result[k]), at(expected[k]), floats * sizeof(float));
+            job.transmittance = at(result[3]);
+            for (int k = 0; k < 3; k++) job.sum[k] = at(result[k]);
+            es_gi_kernel_table((es_isa)isa)->blend(&job, 0, rows);
+            for (uint32_t y = 0; y < rows; y++)
+                for (uint32_t x = 0; x < stride; x++) {
+                    const size_t i = (size_t)y * stride + x;
+                    const float a = x < columns ? at(alpha)[i] : 0, t = at(expected[3])[i], weight = t * a;
+                    const float through = job.through && a > 0 ? t * (1.0f - a) : t;
+                    assert_memory_equal(&at(result[3])[i], &through, sizeof through);
+                    for (int k = 0; k < 3; k++) {
+                        const float before = at(expected[k])[i], added = weight * at(layer[k])[i], after = a > 0 && job.layer[0] ? before + added : before;
+                        assert_memory_equal(&at(result[k])[i], &after, sizeof after);
+                    }
+                }
+        }
+        for (int k = 0; k < 4; k++) check_guards(result[k]);
+        free(alpha.memory);
+        for (int k = 0; k < 3; k++) free(layer[k].memory);
+        for (int k = 0; k < 4; k++) {
+            free(expected[k].memory);
+            free(result[k].memory);
+        }
+    }
+}
+
 static void time_all(void)
 {
     enum { COUNT = 1024, SIZE = 128, REPEAT = 3 };
@@ -397,6 +445,7 @@ int main(int argc, char** argv)
         cmocka_unit_test(check_upsample),
         cmocka_unit_test(check_upsample_leaves_the_unseen),
         cmocka_unit_test(check_micro_upsample),
+        cmocka_unit_test(check_blend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

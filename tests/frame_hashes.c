@@ -9,7 +9,8 @@
  * moves only the eye, `exposure` only the display, `seed` only the virtual lights; `classic` draws accurate shadow maps;
  * `half-temporal` and `temporal` blend light with that of the frame before, `antialiased` the picture as well;
  * `bounces`, `one-pass` and `reflective` have three bounces by rays, by maps and by reflective maps after a step; `moving` are the scenes
- * that move by themselves, with the hash of the world's state after a second; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
+ * that move by themselves, with the hash of the world's state after a second; `blended` and `micro-blended` see through three materials of
+ * `parts`; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
  *        frame_hashes --isas | --scenes
@@ -77,6 +78,7 @@ static void make_sphere(sphere* s)
 
 typedef struct parts {
     es_node ball, lamp;
+    es_material blended[3]; /* in the last frames */
     es_mesh mesh;
     sphere shape;
 } parts;
@@ -202,6 +204,9 @@ static void make_parts(es_context* context, const es_world_settings* settings, e
     desc.base_color[0] = 0.1f;
     desc.emission[1] = 0.5f;
     es_material unlit = add_material(world, "unlit", &desc);
+
+    const es_material through[3] = {fence, metal, unlit};
+    memcpy(p->blended, through, sizeof through);
 
     es_mesh_desc ball = {.name = "ball", .vertex_count = SPHERE_VERTICES, .triangle_count = SPHERE_TRIANGLES,
         .positions = p->shape.positions, .uv0 = p->shape.uvs, .colors = p->shape.colors, .indices = p->shape.indices};
@@ -425,6 +430,26 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
     check(context, es_renderer_render(renderer, world), "rendering");
     check(context, es_world_step(world, 1.0f / 30), "a step");
     print_images(context, renderer, world, p->name, "micro-sparse", folder);
+
+    for (int i = 0; made && i < 3; i++) {
+        es_material_desc material;
+        check(context, es_world_get_material(world, made->blended[i], &material), "reading a material");
+        material.blend = true;
+        material.alpha_mask = false;
+        material.base_color[3] = 0.75f - 0.125f * (float)i;
+        check(context, es_world_set_material(world, made->blended[i], &material), "blending a material");
+    }
+    if (made) {
+        print_images(context, renderer, world, p->name, "micro-blended", folder);
+        settings.method = ES_GI_ISM;
+        settings.bounces = 2;
+        settings.temporal = false;
+        settings.blend_layers = 2;
+        settings.width = p->width;
+        settings.height = p->height;
+        check(context, es_renderer_configure(renderer, &settings), "blending");
+        print_images(context, renderer, world, p->name, "blended", folder);
+    }
 
     es_renderer_destroy(renderer);
     es_world_destroy(world);

@@ -62,9 +62,16 @@ VINL rgb_v reflected(const float* const irradiance[3], const float* const specul
     return lobes ? sum(c, load_rgb(specular, at)) : c;
 }
 
-/* From its parts; stores those that are wanted. */
-VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y)
+VINL rgb_v behind(rgb_v c, vf transmittance, const float* const layers[3], size_t at)
 {
+    c = scaled(c, transmittance);
+    return layers[0] ? sum(c, load_rgb(layers, at)) : c;
+}
+
+/* From its parts; stores those that are wanted. `layered`: behind blended layers. */
+VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y, bool layered)
+{
+    const es_compose_layers* layers = &job->layers;
     const es_gbuffer* g = job->gbuffer;
     const size_t at = (size_t)y * g->stride + x, chunk = (size_t)y * es_lit_chunks(g->stride) + x / ES_LIT_COLUMNS;
     vi rg = vi_load(g->albedo_rg + at), b = vi_load(g->albedo_b + at), surface = vi_load(g->surface + at);
@@ -74,26 +81,34 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y)
     vm unlit = vi_eq(vi_shift_right_logical(surface, 24), vi_set1(ES_SURFACE_UNLIT)) & vm_gt(vf_load(g->depth + at), vf_zero());
     c = sum(c, (rgb_v){vf_and(unlit, albedo.r), vf_and(unlit, albedo.g), vf_and(unlit, albedo.b)});
     if (job->background[0]) c = sum(c, load_rgb(job->background, at));
+    const vf transmittance = layered ? vf_load(layers->transmittance + at) : vf_set1(1.0f);
+    if (layered) c = behind(c, transmittance, layers->emitted, at);
     store_rgb(job->emitted, at, c);
     const bool lamps = job->lamp_irradiance[0] || job->lamp_specular[0];
     vf diffuse = vf_zero();
     if (job->irradiance[0] || job->lamp_irradiance[0]) diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f));
 
-    rgb_v direct = {vf_zero(), vf_zero(), vf_zero()};
+    rgb_v direct = {vf_zero(), vf_zero(), vf_zero()}, by_lamps = direct;
     if (job->direct[0]) direct = load_rgb(job->direct, at);
     if (lamps) {
         const rgb_v lit = reflected(job->lamp_irradiance, job->lamp_specular, job->lamp_specular[0] && (!job->lamp_lit || job->lamp_lit[chunk] & 1), albedo, diffuse, at);
-        direct = sum(direct, (rgb_v){vf_and(~unlit, lit.r), vf_and(~unlit, lit.g), vf_and(~unlit, lit.b)});
+        by_lamps = (rgb_v){vf_and(~unlit, lit.r), vf_and(~unlit, lit.g), vf_and(~unlit, lit.b)};
     }
+    const rgb_v here = lamps ? sum(direct, by_lamps) : direct;
+    direct = layered ? sum(behind(direct, transmittance, layers->direct, at), behind(by_lamps, transmittance, layers->lamps, at)) : here;
     store_rgb(job->whole_direct, at, direct);
     c = sum(c, direct);
 
     rgb_v indirect = reflected(job->irradiance, job->specular, job->specular[0] && (!job->lit || job->lit[chunk] & 1), albedo, diffuse, at);
     indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
+    store_rgb(job->reflected, at, sum(here, indirect));
+    if (layered) indirect = behind(indirect, transmittance, layers->bounded, at);
     store_rgb(job->bounded, at, indirect);
-    store_rgb(job->reflected, at, sum(direct, indirect));
-    for (int i = 0; i < ES_FURTHER_LIGHTS; i++)
-        if (job->further[i][0]) indirect = sum(indirect, load_rgb(job->further[i], at));
+    for (int i = 0; i < ES_FURTHER_LIGHTS; i++) {
+        if (!job->further[i][0]) continue;
+        const rgb_v further = load_rgb(job->further[i], at);
+        indirect = sum(indirect, layered ? scaled(further, transmittance) : further);
+    }
     store_rgb(job->indirect, at, indirect);
     return sum(c, indirect);
 }
@@ -102,9 +117,11 @@ void ES_KERNEL(es_gi_compose)(const es_compose_job* job, uint32_t row_begin, uin
 {
     const es_gbuffer* g = job->gbuffer;
     for (uint32_t y = row_begin; y < row_end; y++) {
+        const bool layered_row = job->layers.transmittance && y >= job->layers.row_begin && y < job->layers.row_end;
         for (uint32_t x = 0; x < g->width; x += VW) {
             size_t at = (size_t)y * g->stride + x;
-            rgb_v c = job->finished[0] ? load_rgb(job->finished, at) : radiance_at(job, x, y);
+            const bool layered = layered_row && x >= job->layers.column_begin && x < job->layers.column_end;
+            rgb_v c = job->finished[0] ? load_rgb(job->finished, at) : layered ? radiance_at(job, x, y, true) : radiance_at(job, x, y, false);
             store_rgb(job->radiance, at, c);
             if (!job->xrgb && !job->display[0]) continue;
             c = scaled(c, vf_set1(job->exposure_scale));

@@ -141,8 +141,10 @@ static es_result begin(es_reference* r, es_world* world)
     r->bounces = r->settings.bounces;
     r->sums = es_allocate_array(r->context, value_count(r) * es_reference_image_count(r), sizeof *r->sums);
     if (r->sums) r->squares = es_allocate_array(r->context, value_count(r) * es_reference_square_count(r), sizeof *r->squares);
-    if (r->squares && !r->settings.antialias) r->first_hits = es_allocate_array(r->context, (size_t)r->width * r->height, sizeof *r->first_hits);
-    if (!r->squares || (!r->first_hits && !r->settings.antialias)) return es_context_last_result(r->context);
+    /* what is seen through blended surfaces differs from sample to sample */
+    const bool same_hits = !r->settings.antialias && !r->scene.has_blended;
+    if (r->squares && same_hits) r->first_hits = es_allocate_array(r->context, (size_t)r->width * r->height, sizeof *r->first_hits);
+    if (!r->squares || (!r->first_hits && same_hits)) return es_context_last_result(r->context);
     r->looked = false;
     r->world = world;
     r->revisions = es_world_get_revisions(world);
@@ -233,6 +235,9 @@ typedef struct tile_pixels {
     es_vec3 bounce[ES_PATH_GROUP * (MAX_BOUNCES + 1)];
 } tile_pixels;
 
+/* Pairs of numbers that no vertex of a path uses (gi/reference/path.c). */
+enum { PAIR_PIXEL = 0xffff, PAIR_LAYER = 0xfffd };
+
 static uint32_t begin_path(const es_reference* r, uint32_t pixel, uint32_t seed, uint32_t sample, es_path_start* start, es_vec3* direct)
 {
     uint32_t rays = 0, x = pixel % r->width, y = pixel / r->width;
@@ -243,11 +248,12 @@ static uint32_t begin_path(const es_reference* r, uint32_t pixel, uint32_t seed,
         *direct = es_v3(first->direct[0], first->direct[1], first->direct[2]);
         return 0;
     }
-    float u[2];
-    es_path_numbers(seed, 0xffffu, sample, u);
+    float u[2] = {0.5f, 0.5f}, layer[2] = {0, 0};
+    if (r->settings.antialias) es_path_numbers(seed, PAIR_PIXEL, sample, u);
+    if (r->scene.has_blended) es_path_numbers(seed, PAIR_LAYER, sample, layer);
     es_ray ray = es_path_ray(&r->rays, (float)x + u[0] - 0.5f, (float)y + u[1] - 0.5f);
     es_hit hit;
-    es_trace_closest(&r->scene, ray, true, &hit);
+    es_trace_seen(&r->scene, ray, layer[0], &hit);
     es_path_begin(&r->scene, &ray, &hit, r->settings.quantised, start);
     *direct = es_path_direct(&r->scene, start, &rays);
     return rays + 1;

@@ -26,7 +26,7 @@ struct es_reference {
     es_film_sum* sums;                 /* [image][pixel][3] */
     float* squares;                    /* [image][pixel][3], of values over `unit` */
     float unit;                        /* of radiance, a power of two */
-    es_first_hit* first_hits;          /* per pixel, while antialias is off: filled before the first sample */
+    es_first_hit* first_hits;          /* per pixel, while antialias is off and nothing blends: filled before the first sample */
     bool looked;
     uint64_t fingerprint;
     es_reference_stats stats;

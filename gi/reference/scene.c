@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "gi/blend_lists.h"
 #include "platform/context.h"
 #include "raster/pack.h"
 
@@ -187,12 +188,16 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
 
 /* ---- rays ------------------------------------------------------------------------------------------------------------------------------ */
 
-bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit)
+static const es_material_desc* material_of(const es_trace_scene* scene, const es_hit* hit)
+{
+    return &scene->materials[scene->instances[es_bvh_primitives(scene->bvh)[hit->primitive].instance].material];
+}
+
+static float alpha_at(const es_trace_scene* scene, const es_hit* hit)
 {
     const es_bvh_primitive* primitive = &es_bvh_primitives(scene->bvh)[hit->primitive];
     const es_raster_instance* instance = &scene->instances[primitive->instance];
     const es_material_desc* m = &scene->materials[instance->material];
-    if (!m->alpha_mask) return false;
     corner_weights c = weights_of(instance->mesh, primitive->triangle, hit->u, hit->v);
     float alpha = m->base_color[3], color[4], uvs[4] = {0, 0, 0, 0}, texel[4];
     if (instance->mesh->colors) {
@@ -204,16 +209,25 @@ bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit)
         es_trace_sample_texture(&m->base_color_texture, uvs, texel);
         alpha *= texel[3];
     }
-    return alpha < m->alpha_cutoff;
+    return alpha;
+}
+
+bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit)
+{
+    const es_material_desc* m = material_of(scene, hit);
+    return (m->alpha_mask || m->blend) && alpha_at(scene, hit) < m->alpha_cutoff;
+}
+
+static bool shows_its_back(const es_trace_scene* scene, const es_hit* hit, const es_ray* ray)
+{
+    const es_raster_instance* instance = &scene->instances[es_bvh_primitives(scene->bvh)[hit->primitive].instance];
+    es_vec3 unused;
+    return !scene->materials[instance->material].double_sided && !faces(scene, instance, hit->primitive, es_v3(-ray->direction[0], -ray->direction[1], -ray->direction[2]), &unused);
 }
 
 static bool lets_through(const es_trace_scene* scene, const es_hit* hit, const es_ray* ray, bool camera)
 {
-    const es_raster_instance* instance = &scene->instances[es_bvh_primitives(scene->bvh)[hit->primitive].instance];
-    es_vec3 unused;
-    if (camera && !scene->materials[instance->material].double_sided &&
-        !faces(scene, instance, hit->primitive, es_v3(-ray->direction[0], -ray->direction[1], -ray->direction[2]), &unused)) return true;
-    return es_trace_is_hole(scene, hit);
+    return (camera && shows_its_back(scene, hit, ray)) || es_trace_is_hole(scene, hit);
 }
 
 bool es_trace_closest(const es_trace_scene* scene, es_ray ray, bool camera, es_hit* hit)
@@ -221,6 +235,35 @@ bool es_trace_closest(const es_trace_scene* scene, es_ray ray, bool camera, es_h
     es_bvh_closest(scene->bvh, ES_RAYS_SINGLE, &ray, 1, hit);
     while (hit->primitive != ES_NO_PRIMITIVE) {
         if ((!camera && !scene->has_masks) || !lets_through(scene, hit, &ray, camera)) return true;
+        const es_hit passed = *hit;
+        es_bvh_beyond(scene->bvh, &ray, &passed, hit);
+    }
+    return false;
+}
+
+/* A ray through the edge of two triangles meets both (gi/kernels/trace.c), but there is one surface. */
+static bool on_edge(const es_hit* hit) { return es_minf(es_minf(hit->u, hit->v), 1.0f - hit->u - hit->v) < 1e-6f; }
+static bool same_surface(const es_trace_scene* scene, const es_hit* a, const es_hit* b)
+{
+    const es_bvh_primitive* p = es_bvh_primitives(scene->bvh);
+    return a->primitive != ES_NO_PRIMITIVE && p[a->primitive].instance == p[b->primitive].instance && on_edge(a) && on_edge(b) && b->t - a->t <= 1e-5f * b->t;
+}
+
+bool es_trace_seen(const es_trace_scene* scene, es_ray ray, float u, es_hit* hit)
+{
+    es_hit layer = {.primitive = ES_NO_PRIMITIVE}; /* the last that was seen through */
+    es_bvh_closest(scene->bvh, ES_RAYS_SINGLE, &ray, 1, hit);
+    while (hit->primitive != ES_NO_PRIMITIVE) {
+        const bool blended = material_of(scene, hit)->blend;
+        if (!shows_its_back(scene, hit, &ray) && !(blended && same_surface(scene, &layer, hit))) {
+            if (!blended && !es_trace_is_hole(scene, hit)) return true;
+            const float alpha = blended ? alpha_at(scene, hit) : 0.0f;
+            if (alpha >= ES_BLEND_MOST || (alpha >= ES_BLEND_LEAST && u < alpha)) return true;
+            if (alpha >= ES_BLEND_LEAST) {
+                u = (u - alpha) / (1.0f - alpha); /* the rest of the interval is the next surface's */
+                layer = *hit;
+            }
+        }
         const es_hit passed = *hit;
         es_bvh_beyond(scene->bvh, &ray, &passed, hit);
     }
@@ -345,7 +388,9 @@ es_result es_trace_scene_take(es_trace_scene* scene, es_world* world, bool emiss
         es_mat4_normal_matrix(&m, scene->normal_matrices[i]);
         if (es_mat4_determinant3(&m) < 0.0f)
             for (int k = 0; k < 9; k++) scene->normal_matrices[i][k] = -scene->normal_matrices[i][k];
-        scene->has_masks |= scene->materials[scene->instances[i].material].alpha_mask;
+        const es_material_desc* material = &scene->materials[scene->instances[i].material];
+        scene->has_masks |= material->alpha_mask || material->blend;
+        scene->has_blended |= material->blend;
     }
     if (!emission) return ES_OK;
     result = gather_emitters(scene);

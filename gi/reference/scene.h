@@ -13,7 +13,7 @@ typedef struct es_trace_scene {
     float (*normal_matrices)[9];       /* per instance */
     es_light_state* lights;
     uint32_t instance_count, material_count, light_count;
-    bool has_masks;
+    bool has_masks, has_blended;       /* blended surfaces are masks to all rays but the camera's */
     /* glowing triangles and the environment; `emitter_sums` runs up to 1 over the primitives by area × mean emission */
     uint32_t* emitters;
     float* emitter_sums;
@@ -48,7 +48,10 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
 /* The nearest surface that stops the ray, alpha masks applied. `camera`: backs of single-sided surfaces do not stop it. */
 bool es_trace_closest(const es_trace_scene* scene, es_ray ray, bool camera, es_hit* hit);
 bool es_trace_blocked(const es_trace_scene* scene, es_ray ray);
-/* Is the alpha mask open there? */
+/* The same for a camera that sees through blended surfaces: each, from the nearest, stops the ray with probability alpha (as layers do: gi/blend_lists.h), by u in [0, 1).
+ * So the mean over u is C = alpha C_surface + (1 - alpha) C_behind. */
+bool es_trace_seen(const es_trace_scene* scene, es_ray ray, float u, es_hit* hit);
+/* Is the alpha mask, or a blended surface, open there? */
 bool es_trace_is_hole(const es_trace_scene* scene, const es_hit* hit);
 
 /* At the finest level: a path's end has no pixel to be filtered for. `uvs`: both sets, as vertices have them. */

@@ -65,7 +65,7 @@ static es_result occlude(es_renderer* r, const es_frame_inputs* in)
     const es_renderer_settings* s = &r->settings;
     es_screen_buffers* b = &r->screen;
     b->directional = s->lamps == ES_LAMPS_SCREEN;
-    b->has_specular = es_surfaces_have_lobes(in->list) || (r->plan.valid[ES_PASS_LAMP_LIGHT] && r->lamps.has_specular);
+    b->has_specular = es_surfaces_have_lobes(in->solid) || (r->plan.valid[ES_PASS_LAMP_LIGHT] && r->lamps.has_specular);
     es_planes* const planes[] = {&b->share, &b->filtered_share, &b->arriving, &b->reflected};
     es_result result = ES_OK;
     for (int i = 0; i < (b->has_specular ? 4 : 3) && !result; i++) result = es_planes_resize(r->context, planes[i], &r->gbuffer);

@@ -55,7 +55,7 @@ static es_result peel(es_renderer* r, const es_frame_inputs* in, uint32_t planes
         if (back) view.cull = ES_CULL_FRONT;
         const es_depth_range range = {.behind = b->drawn[i - 1], .drawn = i + 1 < r->settings.screen_layers ? b->drawn[i] : NULL, .stride = r->gbuffer.stride};
         result = resize(r->context, layer, r->gbuffer.width, r->gbuffer.height, planes);
-        if (!result) result = es_draw_gbuffer_between(r->rasterizer, in->list, &view, &range, &layer->gbuffer, &stats);
+        if (!result) result = es_draw_gbuffer_between(r->rasterizer, in->solid, &view, &range, &layer->gbuffer, &stats);
         *triangles += stats.triangles;
         if (result || !back || planes != LIT_PLANES) continue;
         turning t = {es_gi_kernel_table(es_context_isa(r->context)), &layer->gbuffer};
@@ -95,7 +95,7 @@ static es_result look(es_renderer* r, const es_frame_inputs* in, uint32_t planes
         es_screen_layer* layer = &r->screen.layers[v][0];
         es_raster_stats stats = {0};
         result = resize(r->context, layer, view->width, view->height, planes);
-        if (!result) result = es_draw_gbuffer(r->rasterizer, in->list, view, &layer->gbuffer, &stats);
+        if (!result) result = es_draw_gbuffer(r->rasterizer, in->solid, view, &layer->gbuffer, &stats);
         *triangles += stats.triangles;
     }
     return result;

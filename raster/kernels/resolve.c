@@ -15,7 +15,7 @@
  *   1. finds its visible triangles, and one pixel of each;
  *   2. sets each up once: planes for 1 / w and attributes / w about that pixel (es_visible_triangle);
  *   3. evaluates the planes per pixel: one 128-byte record a lane instead of three vertices of three streams.
- * Triangles with textures or moving vertices ("complex") are interpolated per pixel from their vertices instead.
+ * Triangles with textures or moving vertices, and all where alpha is wanted ("complex"), are interpolated per pixel from their vertices instead.
  *
  * Visibility is decided on snapped vertices, so a pixel centre can lie outside the unsnapped triangle; where lambda is computed, negative
  * ones become zero, and 1 / w is kept within the vertices' range. Of a sliver not much wider than that distance, the negative part is as
@@ -205,8 +205,9 @@ static __attribute__((noinline)) void resolve_textures(const surface8* s, uint32
         v3 n = select3(directed(*normal), *normal, geometric);
         *normal = map_normal(s, unit(n), &texel);
     }
-    if ((planes & ES_GBUFFER_ALBEDO) && textures[ES_TEXTURE_BASE_COLOR].image) {
+    if ((planes & (ES_GBUFFER_ALBEDO | ES_GBUFFER_ALPHA)) && textures[ES_TEXTURE_BASE_COLOR].image) {
         ES_SAMPLE_(ES_TEXTURE_BASE_COLOR);
+        color->a = color->a * texel.a;
         color->r = color->r * texel.r;
         color->g = color->g * texel.g;
         color->b = color->b * texel.b;
@@ -393,9 +394,11 @@ static void resolve_complex(const es_resolve_job* job, const es_prepared_instanc
     if (mesh->normals) normal = transform3(instance->normal_matrix, interpolate3(&s, mesh->normals, NULL));
     else normal = flip(geometric, backward); /* geometric normals point to the eye, the frame of a normal map to the front */
 
-    es_rgba color = {vf_set1(material->base_color[0]), vf_set1(material->base_color[1]), vf_set1(material->base_color[2]), vf_zero()};
-    if ((planes & ES_GBUFFER_ALBEDO) && mesh->colors) {
-        v3 c = interpolate3(&s, mesh->colors, NULL);
+    es_rgba color = {vf_set1(material->base_color[0]), vf_set1(material->base_color[1]), vf_set1(material->base_color[2]), vf_set1(material->base_color[3])};
+    if ((planes & (ES_GBUFFER_ALBEDO | ES_GBUFFER_ALPHA)) && mesh->colors) {
+        vf a;
+        v3 c = interpolate3(&s, mesh->colors, &a);
+        color.a = color.a * a;
         color.r = color.r * c.x;
         color.g = color.g * c.y;
         color.b = color.b * c.z;
@@ -413,6 +416,7 @@ static void resolve_complex(const es_resolve_job* job, const es_prepared_instanc
         put(t, g->albedo_rg, es_pack_unorm16_v(color.r) | (es_pack_unorm16_v(color.g) << 16));
         put(t, g->albedo_b, es_pack_unorm16_v(color.b) | vi_set1((int32_t)(instance->material_index << 16)));
     }
+    if (planes & ES_GBUFFER_ALPHA) put_float(t, g->alpha, vf_and(vm_gt(color.a, vf_zero()), vf_min(color.a, vf_set1(1.0f)))); /* what is not a number is 0 */
     if (!(planes & ES_GBUFFER_MOTION)) return;
     vf motion_x = vf_zero(), motion_y = vf_zero();
     if (instance->has_deltas) {
@@ -462,7 +466,8 @@ static void set_up_visible(const es_resolve_job* job, uint32_t which, vm mask, v
     const es_prepared_material* material = instance->material;
     const es_raster_mesh* mesh = instance->mesh;
     const uint32_t planes = job->gbuffer.planes;
-    bool complex = material->any_texture || ((planes & ES_GBUFFER_MOTION) && instance->has_deltas);
+    /* records have no room for alpha, which few views want */
+    bool complex = material->any_texture || ((planes & ES_GBUFFER_MOTION) && instance->has_deltas) || (planes & ES_GBUFFER_ALPHA);
     uint32_t tag = which | (complex ? (uint32_t)ES_VISIBLE_COMPLEX : 0u) | (instance->moving ? (uint32_t)ES_VISIBLE_MOVING : 0u);
     vf words[32];
     for (int i = 0; i < 32; i++) words[i] = vf_zero();
@@ -652,6 +657,7 @@ VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi
         put_float(t, g->motion_x, motion_x);
         put_float(t, g->motion_y, motion_y);
     }
+    if (planes & ES_GBUFFER_ALPHA) put_float(t, g->alpha, vf_zero()); /* all are complex then; what they do not cover is zero */
     uint32_t pending = vm_bits(complex);
     if (!pending) return;
     vi id = vi_gather(triangle_ids, id_numbers);
@@ -665,7 +671,7 @@ VINL void resolve_pixels(const es_resolve_job* job, const target* t, vi slot, vi
 
 static void clear_pixels(const es_gbuffer* g, size_t at)
 {
-    float* const floats[] = {g->depth, g->motion_x, g->motion_y};
+    float* const floats[] = {g->depth, g->motion_x, g->motion_y, g->alpha};
     uint32_t* const words[] = {g->normal, g->geometric_normal, g->albedo_rg, g->albedo_b, g->surface, g->emission, g->instance, g->triangle};
     for (size_t i = 0; i < sizeof floats / sizeof *floats; i++)
         if (floats[i]) vf_store(floats[i] + at, vf_zero());
