@@ -198,7 +198,7 @@ typedef struct es_renderer_settings {
     /* second-order illumination: SECOND_ORDER. geometry_bound and spread apply, seed shifts the sequences; what is above on virtual point lights does not besides */
     uint32_t second_lights;          /* lights (table 1: 300) */
     uint32_t second_negative;        /* negative ones (150) */
-    float second_threshold;          /* gi/second_order.h: pixels whose neighbours at half the resolution differ by more are lit at their own */
+    float second_threshold;          /* gi/second_order.h: pixels whose neighbours at half the resolution differ by so much or more are lit at their own; 0: all */
     /* bias compensation in screen space (Novák et al. 2011), with the methods that have virtual point lights: what geometry_bound takes from their light is found
      * again among the pixels; spread does not apply then, and with near_distance or another traced_bias than BOUNDED there is nothing to be found. Of
      * screen_layers behind the first the direct light is sent as well */

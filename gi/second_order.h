@@ -10,9 +10,9 @@
  * goes on behind it: a light of E times the area that the point stands for, in the mean of the lights' directions weighted by what each sends. Their sum
  * I_n is subtracted, but no more than there is.
  *
- * Both are found for one pixel of 2 × 2 (§3.5) and interpolated, but where the surfaces of the four around a pixel differ from its own by more than a threshold:
- *     1 - n · n' + 10 |(p' - p) · n| / depth > threshold,
- * there for the pixel itself.
+ * Both are found for one pixel of 2 × 2 (§3.5) and interpolated, but where the surfaces of the four around a pixel differ from its own by a threshold or more:
+ *     1 - n · n' + 10 |(p' - p) · n| / depth >= threshold,
+ * there for the pixel itself; with 0 so everywhere.
  *
  * What is wrong with it by construction: only what the camera sees takes light away, at places that do not depend on what hides what; light passes through everything
  * else; surfaces reflect it as if they were matt; there is one bounce. */

@@ -66,6 +66,8 @@ static void test_sum(void** state)
     es_renderer* renderer;
     assert_int_equal(es_renderer_create(context, &s, &renderer), ES_OK);
     assert_int_equal(es_renderer_render(renderer, world), ES_OK);
+    /* all but those of the half resolution, which are lit at their own anyway */
+    assert_true(count_of(renderer, "second-order light") == WIDTH * HEIGHT * 3 / 4);
     static es_vpl lights[LIGHTS];
     const size_t count = es_renderer_vpls(renderer, lights, LIGHTS);
     assert_true(count > LIGHTS / 2 && count <= LIGHTS);

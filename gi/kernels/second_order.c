@@ -107,7 +107,7 @@ void ES_KERNEL(es_gi_open_upsample)(const es_open_upsample_job* job, uint32_t ro
                     for (uint32_t i = 0; i < 2; i++) {
                         const surface_place q = place_of(g, &job->rays, columns[i] << 1, rows[j] << 1, inside);
                         const vf off = vf_abs((q.x - p.x) * p.nx + (q.y - p.y) * p.ny + (q.z - p.z) * p.nz), turn = one - (p.nx * q.nx + p.ny * q.ny + p.nz * q.nz);
-                        other |= ~q.seen | vm_gt(vf_max(turn, zero) + off * per_depth, vf_set1(job->threshold));
+                        other |= ~q.seen | ~vm_lt(vf_max(turn, zero) + off * per_depth, vf_set1(job->threshold));
                         const vi at = vi_set1((int32_t)(rows[j] * job->half_stride)) + (inside & columns[i]);
                         for (uint32_t k = 0; k < job->plane_count; k++) sum[k] = sum[k] + vf_gather(job->source[k], at);
                     }
