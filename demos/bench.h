@@ -44,6 +44,8 @@ double bench_median(double* values, size_t count); /* sorts; NaN without values 
 
 /* bench_table.c: the rows of `bench speed` and their targets, figures still NaN */
 size_t bench_speed_rows(bench_row* rows, size_t capacity);
+/* The table of a benchmark, figures still NaN; how many rows there is room for. */
+size_t bench_copy_rows(const bench_row* table, size_t count, bench_row* rows, size_t capacity);
 bench_row* bench_find_row(bench_row* rows, size_t count, const char* id);
 
 /* bench.c: the benchmarks that there are, in the page's order; NULL past the last */

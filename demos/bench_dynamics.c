@@ -25,15 +25,7 @@ static const bench_row table[FIGURES] = {
     [STRETCH_128] = {"cloth-128-stretch", "its most stretched edge, after 10 s", "x", TWENTY, BENCH_VALUE_AT_MOST, 1.1, 1.1},
 };
 
-size_t bench_dynamics_rows(bench_row* rows, size_t capacity)
-{
-    size_t count = FIGURES < capacity ? FIGURES : capacity;
-    for (size_t i = 0; i < count; i++) {
-        rows[i] = table[i];
-        rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
-    }
-    return count;
-}
+size_t bench_dynamics_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, FIGURES, rows, capacity); }
 
 /* ---- worlds --------------------------------------------------------------------------------------------------------- */
 

@@ -3,9 +3,6 @@
 #include "bench_micro.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdlib.h>
-#include <string.h>
 
 #define HZ(id, work, must, aim) {id, work, "Hz", NULL, BENCH_VALUE_AT_LEAST, must, aim}
 #define RATE(scene, remark) \
@@ -46,40 +43,13 @@ static const bench_row table[] = {
 };
 enum { ROWS = sizeof table / sizeof table[0] };
 
-size_t bench_micro_rows(bench_row* rows, size_t capacity)
-{
-    const size_t count = ROWS < capacity ? ROWS : capacity;
-    for (size_t i = 0; i < count; i++) {
-        rows[i] = table[i];
-        rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
-    }
-    return count;
-}
+size_t bench_micro_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, ROWS, rows, capacity); }
 
-bench_row* micro_row(micro_bench* bench, const char* format, ...)
-{
-    char id[64];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(id, sizeof id, format, arguments);
-    va_end(arguments);
-    return bench_wants(bench->options, id) ? bench_find_row(bench->rows, bench->count, id) : NULL;
-}
+uint32_t micro_exponent(const bench_sitting* bench) { return bench->options->quick ? 13 : 20; }
 
 /* ---- time ---------------------------------------------------------------------------------------------------------------- */
 
-static double pass_time(const es_renderer* renderer, const char* name, uint64_t* count)
-{
-    const es_frame_stats* stats = es_renderer_stats(renderer);
-    for (size_t i = 0; i < stats->pass_count; i++)
-        if (!strcmp(stats->passes[i].name, name)) {
-            if (count) *count = stats->passes[i].skipped ? 0 : stats->passes[i].count;
-            return stats->passes[i].skipped ? 0 : stats->passes[i].milliseconds;
-        }
-    return NAN;
-}
-
-bool micro_time(micro_bench* bench, es_world* world, const char* text, float dt, bool still, micro_times* times)
+bool micro_time(bench_sitting* bench, es_world* world, const char* text, float dt, bool still, micro_times* times)
 {
     enum { MOST = 32 };
     double frame[MOST], update[MOST], light[MOST], gather[MOST];
@@ -102,9 +72,9 @@ bool micro_time(micro_bench* bench, es_world* world, const char* text, float dt,
         works = works && es_renderer_render(renderer, world) == ES_OK;
         if (i < 0 || !works) continue;
         frame[i] = (demo_seconds() - start) * 1000;
-        update[i] = pass_time(renderer, "point hierarchy", &times->points);
-        light[i] = pass_time(renderer, "point light", NULL);
-        gather[i] = pass_time(renderer, "micro-buffers", &times->samples);
+        update[i] = sitting_pass(renderer, "point hierarchy", &times->points);
+        light[i] = sitting_pass(renderer, "point light", NULL);
+        gather[i] = sitting_pass(renderer, "micro-buffers", &times->samples);
     }
     if (works) *times = (micro_times){bench_median(frame, frames), bench_median(update, frames), bench_median(light, frames), bench_median(gather, frames), times->samples, times->points};
     else demo_refuse_context(bench->context);
@@ -116,37 +86,10 @@ bool micro_time(micro_bench* bench, es_world* world, const char* text, float dt,
 
 int bench_micro(const bench_options* options)
 {
-    micro_bench* bench = calloc(1, sizeof *bench);
-    if (!bench) return demo_refuse("out of memory");
-    bench->options = options;
-    bench->count = bench_micro_rows(bench->rows, MICRO_MAX_ROWS);
-    bench->width = options->width ? options->width : options->quick ? 64 : 512;
-    bench->height = options->height ? options->height : options->quick ? 48 : 512;
-    bench->exponent = options->quick ? 13 : 20;
+    bench_sitting* bench = sitting_open(options, bench_micro_rows, 512, 512);
+    if (!bench) return DEMO_BAD_INPUT;
     bench->frames = options->quick ? 2 : 5;
-    bench->seconds = options->quick ? 1 : 8;
-    bench->truth_samples = options->samples ? options->samples : options->quick ? 4 : 256;
-    bench->truth_seconds = options->quick ? 2 : 120;
     bench->report = (bench_report){.name = "micro", .title = "Micro-buffers",
         .about = "Light gathered at every pixel, or one of 16, from a hierarchy of a million points; 512 × 512 pixels, 24 × 24 micro-buffers, one bounce, unless a row says otherwise."};
-    es_context_desc desc = es_default_context_desc();
-    desc.logger = demo_logger();
-    desc.threads = options->threads;
-    bool works = es_context_create(&desc, &bench->context) == ES_OK;
-    if (!works) demo_refuse("bench micro: no context can be made");
-    works = works && micro_measure_speed(bench) && micro_measure_errors(bench);
-    int code = DEMO_BAD_INPUT;
-    if (works) {
-        bench_row shown[MICRO_MAX_ROWS];
-        size_t count = 0;
-        for (size_t i = 0; i < bench->count; i++)
-            if (bench_wants(options, bench->rows[i].id)) shown[count++] = bench->rows[i];
-        bench_print(shown, count);
-        code = bench_report_write(&bench->report, options, shown, count, bench->context);
-    } else {
-        bench_report_free(&bench->report);
-    }
-    es_context_destroy(bench->context);
-    free(bench);
-    return code;
+    return sitting_close(bench, micro_measure_speed(bench) && micro_measure_errors(bench));
 }

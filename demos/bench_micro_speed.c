@@ -7,27 +7,18 @@
 
 static const float dt = 1.0f / 30;
 
-static es_world* open_scene(micro_bench* bench, const char* name)
-{
-    es_world* world = NULL;
-    if (es_world_create_scene(bench->context, name, NULL, &world) == ES_OK && es_world_step(world, 0) == ES_OK) return world;
-    demo_refuse_context(bench->context);
-    if (world) es_world_destroy(world);
-    return NULL;
-}
-
 static void set_rate(bench_row* row, const micro_times* t)
 {
     row->value = 1000 / t->frame;
     snprintf(row->note, sizeof row->note, "%.4g ms: %.3g of the hierarchy, %.3g of its light, %.4g of %.4g million samples in micro-buffers", t->frame, t->update, t->light, t->gather, (double)t->samples * 1e-6);
 }
 
-static bool measure_rates(micro_bench* bench, const char* scene, const char* ending)
+static bool measure_rates(bench_sitting* bench, const char* scene, const char* ending)
 {
     const bool still = !strcmp(scene, "room"); /* nothing moves in it: all is done again */
-    bench_row *every = micro_row(bench, "micro-every-pixel%s", ending), *sparse = micro_row(bench, "micro-sixteenth%s", ending);
+    bench_row *every = sitting_row(bench, "micro-every-pixel%s", ending), *sparse = sitting_row(bench, "micro-sixteenth%s", ending);
     if (!every && !sparse) return true;
-    es_world* world = open_scene(bench, scene);
+    es_world* world = sitting_open_scene(bench, scene);
     if (!world) return false;
     bool works = true;
     for (int k = 0; k < 2 && works; k++) {
@@ -35,7 +26,7 @@ static bool measure_rates(micro_bench* bench, const char* scene, const char* end
         if (!row) continue;
         char settings[96];
         micro_times times;
-        snprintf(settings, sizeof settings, "micro.points=%u micro.spacing=%d", 1u << bench->exponent, k ? 4 : 1);
+        snprintf(settings, sizeof settings, "micro.points=%u micro.spacing=%d", 1u << micro_exponent(bench), k ? 4 : 1);
         works = micro_time(bench, world, settings, dt, still, &times);
         if (works) set_rate(row, &times);
         if (works) fprintf(stderr, "%s, %s: %.4g ms\n", scene, settings, times.frame);
@@ -91,7 +82,7 @@ static bool add_sheet(es_world* world, sheet* s, uint32_t side)
 }
 
 /* A sheet, a lamp above it, a camera beside the lamp. */
-static es_world* open_sheet(micro_bench* bench, sheet* s, uint32_t side)
+static es_world* open_sheet(bench_sitting* bench, sheet* s, uint32_t side)
 {
     es_world* world = NULL;
     es_node node, camera_node;
@@ -115,18 +106,18 @@ static es_world* open_sheet(micro_bench* bench, sheet* s, uint32_t side)
     return NULL;
 }
 
-static bool measure_refit(micro_bench* bench)
+static bool measure_refit(bench_sitting* bench)
 {
-    bench_row* row = micro_row(bench, "micro-refit");
+    bench_row* row = sitting_row(bench, "micro-refit");
     if (!row) return true;
     sheet s = {0};
     es_world* world = open_sheet(bench, &s, bench->options->quick ? 64 : 512);
-    micro_bench small = *bench;
+    bench_sitting small = *bench;
     small.width = small.height = 64; /* the picture has no part in it */
     small.frames = bench->options->quick ? 2 : 15;
     char settings[64];
     micro_times times;
-    snprintf(settings, sizeof settings, "micro.points=%u micro.spacing=4 micro.size=8", 1u << bench->exponent);
+    snprintf(settings, sizeof settings, "micro.points=%u micro.spacing=4 micro.size=8", 1u << micro_exponent(bench));
     const bool works = world && micro_time(&small, world, settings, dt, false, &times);
     if (works) {
         row->value = times.update;
@@ -142,11 +133,11 @@ static bool measure_refit(micro_bench* bench)
 
 /* ---- growth ------------------------------------------------------------------------------------------------------------------- */
 
-static bool measure_growth(micro_bench* bench)
+static bool measure_growth(bench_sitting* bench)
 {
-    bench_row *ratio = micro_row(bench, "micro-growth"), *rows[MICRO_EXPONENTS];
+    bench_row *ratio = sitting_row(bench, "micro-growth"), *rows[MICRO_EXPONENTS];
     bool any = ratio != NULL;
-    for (int k = 0; k < MICRO_EXPONENTS; k++) any |= (rows[k] = micro_row(bench, "micro-points-%d", MICRO_LEAST_EXPONENT + k)) != NULL;
+    for (int k = 0; k < MICRO_EXPONENTS; k++) any |= (rows[k] = sitting_row(bench, "micro-points-%d", MICRO_LEAST_EXPONENT + k)) != NULL;
     if (!any) return true;
     plot_curves plot = {.id = "growth", .x_name = "points", .y_name = "milliseconds", .x_log = true, .y_log = true};
     plot_series *whole = plot_add_series(&plot, 0, "whole frame"), *update = plot_add_series(&plot, 1, "hierarchy and its light");
@@ -160,7 +151,7 @@ static bool measure_growth(micro_bench* bench)
         char settings[64];
         micro_times t;
         snprintf(settings, sizeof settings, "micro.points=%u", 1u << (MICRO_LEAST_EXPONENT + k));
-        es_world* world = open_scene(bench, "cornell"); /* each from the beginning, so that all see the same frames */
+        es_world* world = sitting_open_scene(bench, "cornell"); /* each from the beginning, so that all see the same frames */
         works = world && micro_time(bench, world, settings, dt, false, &t);
         if (world) es_world_destroy(world);
         if (!works) break;
@@ -189,18 +180,18 @@ static bool measure_growth(micro_bench* bench)
 
 /* ---- samples beside rays ---------------------------------------------------------------------------------------------------------- */
 
-static bool measure_samples(micro_bench* bench)
+static bool measure_samples(bench_sitting* bench)
 {
     enum { MOST_ROUNDS = 50 };
-    bench_row* row = micro_row(bench, "micro-samples");
+    bench_row* row = sitting_row(bench, "micro-samples");
     if (!row) return true;
     bench_peer* peer = calloc(1, sizeof *peer);
-    es_world* world = peer ? open_scene(bench, "room") : NULL;
+    es_world* world = peer ? sitting_open_scene(bench, "room") : NULL;
     double rates[MOST_ROUNDS];
     const uint32_t rounds = bench->options->quick ? 1 : bench->options->runs < 3 ? bench->options->runs : 3;
     bool works = world != NULL, with_peer = peer && bench_peer_open(peer, BENCH_EMBREE_RAYS, !bench->options->no_peer && !bench->options->quick);
     char settings[64];
-    snprintf(settings, sizeof settings, "micro.points=%u", 1u << bench->exponent);
+    snprintf(settings, sizeof settings, "micro.points=%u", 1u << micro_exponent(bench));
     for (uint32_t round = 0; round < rounds && works; round++) {
         micro_times t;
         works = micro_time(bench, world, settings, 0, true, &t);
@@ -222,7 +213,7 @@ static bool measure_samples(micro_bench* bench)
     return works;
 }
 
-bool micro_measure_speed(micro_bench* bench)
+bool micro_measure_speed(bench_sitting* bench)
 {
     return measure_rates(bench, "cornell", "") && measure_rates(bench, "room", "-room") && measure_rates(bench, "hall", "-hall") && measure_rates(bench, "gallery", "-gallery") && measure_refit(bench) &&
            measure_growth(bench) && measure_samples(bench);

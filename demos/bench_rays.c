@@ -31,15 +31,7 @@ static const char* const peer_rows[FIGURES] = {"primary intersect1", "hemi occlu
 static const char* const peer_scenes[SCENES] = {"70k", "1M"};
 static const uint32_t scene_triangles[SCENES] = {70000, 1000000};
 
-size_t bench_rays_rows(bench_row* rows, size_t capacity)
-{
-    size_t count = FIGURES * SCENES < capacity ? FIGURES * SCENES : capacity;
-    for (size_t i = 0; i < count; i++) {
-        rows[i] = table[i];
-        rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
-    }
-    return count;
-}
+size_t bench_rays_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, FIGURES * SCENES, rows, capacity); }
 
 /* ---- rays -------------------------------------------------------------------------------------------------------- */
 

@@ -37,15 +37,7 @@ static const bench_row table[] = {
     {"scale-triangles-4m", "whole frame at the most triangles that were tried", "ms", NULL, BENCH_NONE, 0, 0},
 };
 
-size_t bench_scale_rows(bench_row* rows, size_t capacity)
-{
-    size_t count = sizeof table / sizeof table[0];
-    for (size_t i = 0; i < count && i < capacity; i++) {
-        rows[i] = table[i];
-        rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
-    }
-    return count < capacity ? count : capacity;
-}
+size_t bench_scale_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, sizeof table / sizeof table[0], rows, capacity); }
 
 /* ---- one frame --------------------------------------------------------------------------------------------------- */
 

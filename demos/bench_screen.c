@@ -1,10 +1,9 @@
 /* `bench screen`: light found in screen space as Ritschel's thesis measures it (§4.4): what occlusion per direction, a bounce, layers and further cameras add to a frame, at
  * 1024 × 768; and what a bounce and repaired shadows take from the error of virtual point lights where surfaces are close together. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "bench_micro.h"
+#include "bench_sitting.h"
 
 #define OVERHEAD(id, work, must, aim) {id, work, "%", NULL, BENCH_VALUE_AT_MOST, must, aim}
 
@@ -18,15 +17,7 @@ static const bench_row table[] = {
 };
 enum { ROWS = sizeof table / sizeof table[0] };
 
-size_t bench_screen_rows(bench_row* rows, size_t capacity)
-{
-    const size_t count = ROWS < capacity ? ROWS : capacity;
-    for (size_t i = 0; i < count; i++) {
-        rows[i] = table[i];
-        rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
-    }
-    return count;
-}
+size_t bench_screen_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, ROWS, rows, capacity); }
 
 /* ---- time ---------------------------------------------------------------------------------------------------------------- */
 
@@ -46,45 +37,34 @@ static bool add_sky(es_context* context, es_world* world)
         }
     const bool works = es_world_set_environment(world, &(es_environment_desc){.image = &image, .radiance = {1, 1, 1}}) == ES_OK;
     es_image_destroy(context, &image);
+    if (!works) demo_refuse_context(context);
     return works;
 }
 
-static double pass_time(const es_renderer* renderer, const char* name)
-{
-    const es_frame_stats* stats = es_renderer_stats(renderer);
-    for (size_t i = 0; i < stats->pass_count; i++)
-        if (!strcmp(stats->passes[i].name, name)) return stats->passes[i].skipped ? 0 : stats->passes[i].milliseconds;
-    return NAN;
-}
-
 /* Medians over frames that take turns, so that what else the machine does falls on all kinds alike. */
-static bool measure_time(micro_bench* bench)
+static bool measure_time(bench_sitting* bench)
 {
     bool any = false;
-    for (size_t i = 0; i + 1 < bench->count; i++) any |= micro_row(bench, "%s", bench->rows[i].id) != NULL;
+    for (size_t i = 0; i + 1 < bench->count; i++) any |= sitting_row(bench, "%s", bench->rows[i].id) != NULL;
     if (!any) return true;
     enum { MOST = 32 };
-    es_world* world = NULL;
+    es_world* world = sitting_open_scene(bench, "hall");
     es_renderer* renderers[KINDS] = {NULL};
     double frame[KINDS][MOST], pass[KINDS][MOST];
-    bool works = es_world_create_scene(bench->context, "hall", NULL, &world) == ES_OK && es_world_step(world, 0) == ES_OK && add_sky(bench->context, world);
+    bool works = world && add_sky(bench->context, world);
     for (int k = 0; k < KINDS && works; k++) {
-        es_renderer_settings settings = es_default_renderer_settings();
-        settings.width = bench->width;
-        settings.height = bench->height;
-        settings.method = ES_GI_NONE;
-        settings.skip = false;
-        works = error_apply(bench->context, &(error_setting){.settings = kinds[k]}, &settings) && es_renderer_create(bench->context, &settings, &renderers[k]) == ES_OK;
+        char text[96];
+        snprintf(text, sizeof text, "gi=none %s", kinds[k]);
+        works = (renderers[k] = sitting_open_renderer(bench, text)) != NULL;
     }
     for (int i = -1; i < (int)bench->frames && works; i++)
         for (int k = 0; k < KINDS && works; k++) {
-            const double start = demo_seconds();
-            works = es_renderer_render(renderers[k], world) == ES_OK;
-            if (i < 0) continue;
-            frame[k][i] = (demo_seconds() - start) * 1000 - pass_time(renderers[k], "environment"); /* that is not made anew while it stands */
-            pass[k][i] = pass_time(renderers[k], k == BOUNCE ? "screen-space bounce" : k == LAYERS || k == CAMERAS ? "screen-space views" : "screen-space occlusion");
+            const double time = sitting_render(bench, renderers[k], world);
+            works = time > 0;
+            if (i < 0 || !works) continue;
+            frame[k][i] = time - sitting_pass(renderers[k], "environment", NULL); /* that is not made anew while it stands */
+            pass[k][i] = sitting_pass(renderers[k], k == BOUNCE ? "screen-space bounce" : k == LAYERS || k == CAMERAS ? "screen-space views" : "screen-space occlusion", NULL);
         }
-    if (!works) demo_refuse_context(bench->context);
     if (works) {
         double whole[KINDS], part[KINDS];
         for (int k = 0; k < KINDS; k++) {
@@ -93,7 +73,7 @@ static bool measure_time(micro_bench* bench)
         }
         const struct { const char* id; int kind, base; } overheads[] = {{"screen-occlusion-8", SCREEN, NOTHING}, {"screen-bounce", BOUNCE, SCREEN}, {"screen-over-ambient", SCREEN, AMBIENT}, {"screen-layers-2", LAYERS, SCREEN}, {"screen-cameras-4", CAMERAS, SCREEN}};
         for (size_t i = 0; i < sizeof overheads / sizeof overheads[0]; i++) {
-            bench_row* row = micro_row(bench, "%s", overheads[i].id);
+            bench_row* row = sitting_row(bench, "%s", overheads[i].id);
             if (!row) continue;
             const double a = whole[overheads[i].kind], b = whole[overheads[i].base];
             row->value = overheads[i].base == NOTHING ? a - b : 100 * (a / b - 1);
@@ -107,27 +87,27 @@ static bool measure_time(micro_bench* bench)
 
 /* ---- error --------------------------------------------------------------------------------------------------------------- */
 
-static bool measure_contact(micro_bench* bench)
+static bool measure_contact(bench_sitting* bench)
 {
-    bench_row* row = micro_row(bench, "screen-contact-crease");
+    bench_row* row = sitting_row(bench, "screen-contact-crease");
     bool exists = false;
     for (size_t i = 0; i < es_scene_count(); i++) exists |= !strcmp(es_scene_name(i), "crease");
     if (!row || !exists) return true;
-    micro_bench near = *bench;
+    bench_sitting near = *bench;
     near.width = bench->options->width ? bench->options->width : bench->options->quick ? 64 : 512;
     near.height = bench->options->height ? bench->options->height : bench->options->quick ? 48 : 384;
     near.contact_reach = 0.05f;
-    micro_stage stage;
-    micro_error alone, with;
-    bool works = micro_open_stage(&near, "crease", &stage) && micro_measure(&near, &stage, "gi=ism vpl.count=1024", &alone) &&
-                 micro_measure(&near, &stage, "gi=ism vpl.count=1024 screen.repair=4 screen.bounce=true", &with);
+    sitting_stage stage;
+    sitting_error alone, with;
+    bool works = sitting_open_stage(&near, "crease", &stage) && sitting_measure(&near, &stage, "gi=ism vpl.count=1024", &alone) &&
+                 sitting_measure(&near, &stage, "gi=ism vpl.count=1024 screen.repair=4 screen.bounce=true", &with);
     if (works) {
         row->value = with.contact;
         row->peer_value = alone.contact;
         row->ratio = alone.contact / with.contact;
         snprintf(row->note, sizeof row->note, "of all pixels %.3f against %.3f; %.4g ms against %.4g", with.all, alone.all, with.milliseconds, alone.milliseconds);
     }
-    micro_close_stage(&near, &stage);
+    sitting_close_stage(&near, &stage);
     return works;
 }
 
@@ -135,34 +115,8 @@ static bool measure_contact(micro_bench* bench)
 
 int bench_screen(const bench_options* options)
 {
-    micro_bench* bench = calloc(1, sizeof *bench);
-    if (!bench) return demo_refuse("out of memory");
-    bench->options = options;
-    bench->count = bench_screen_rows(bench->rows, MICRO_MAX_ROWS);
-    bench->width = options->width ? options->width : options->quick ? 64 : 1024;
-    bench->height = options->height ? options->height : options->quick ? 48 : 768;
-    bench->frames = options->quick ? 2 : 15;
-    bench->truth_samples = options->samples ? options->samples : options->quick ? 4 : 256;
-    bench->truth_seconds = options->quick ? 2 : 120;
+    bench_sitting* bench = sitting_open(options, bench_screen_rows, 1024, 768);
+    if (!bench) return DEMO_BAD_INPUT;
     bench->report = (bench_report){.name = "screen", .title = "Screen space", .about = "Direct light of a sky with occlusion per direction, one bounce, layers and further cameras, found in the picture: what each adds to a frame of 1024 × 768 pixels."};
-    es_context_desc desc = es_default_context_desc();
-    desc.logger = demo_logger();
-    desc.threads = options->threads;
-    bool works = es_context_create(&desc, &bench->context) == ES_OK;
-    if (!works) demo_refuse("bench screen: no context can be made");
-    works = works && measure_time(bench) && measure_contact(bench);
-    int code = DEMO_BAD_INPUT;
-    if (works) {
-        bench_row shown[ROWS];
-        size_t count = 0;
-        for (size_t i = 0; i < bench->count; i++)
-            if (bench_wants(options, bench->rows[i].id)) shown[count++] = bench->rows[i];
-        bench_print(shown, count);
-        code = bench_report_write(&bench->report, options, shown, count, bench->context);
-    } else {
-        bench_report_free(&bench->report);
-    }
-    es_context_destroy(bench->context);
-    free(bench);
-    return code;
+    return sitting_close(bench, measure_time(bench) && measure_contact(bench));
 }

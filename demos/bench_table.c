@@ -28,15 +28,17 @@ static const bench_row table[] = {
         BENCH_RATIO_AT_LEAST, 10, 10},
 };
 
-size_t bench_speed_rows(bench_row* rows, size_t capacity)
+size_t bench_copy_rows(const bench_row* from, size_t count, bench_row* rows, size_t capacity)
 {
-    size_t count = sizeof table / sizeof table[0];
-    for (size_t i = 0; i < count && i < capacity; i++) {
-        rows[i] = table[i];
+    if (count > capacity) count = capacity;
+    for (size_t i = 0; i < count; i++) {
+        rows[i] = from[i];
         rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
     }
-    return count < capacity ? count : capacity;
+    return count;
 }
+
+size_t bench_speed_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, sizeof table / sizeof table[0], rows, capacity); }
 
 bench_row* bench_find_row(bench_row* rows, size_t count, const char* id)
 {

@@ -19,14 +19,7 @@ static const bench_row table[] = {
 };
 enum { ROWS = sizeof table / sizeof table[0] };
 
-size_t bench_time_rows(bench_row* rows, size_t capacity)
-{
-    for (size_t i = 0; i < ROWS && i < capacity; i++) {
-        rows[i] = table[i];
-        rows[i].value = rows[i].peer_value = rows[i].ratio = NAN;
-    }
-    return ROWS < capacity ? ROWS : capacity;
-}
+size_t bench_time_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, ROWS, rows, capacity); }
 
 typedef struct bench_time_stage {
     es_context* context;

@@ -1,5 +1,5 @@
-/* Worlds that micro-buffers are judged in, with the path tracer's picture of each and what is special about its pixels. */
-#include "bench_micro.h"
+/* Worlds that methods are judged in, with the path tracer's picture of each and what is special about its pixels. */
+#include "bench_sitting.h"
 
 #include <errno.h>
 #include <math.h>
@@ -46,12 +46,12 @@ static bool polish_ring(es_world* world, const char* surface)
     return false;
 }
 
-static bool open_world(micro_bench* bench, const char* name, es_world** world)
+static bool open_world(bench_sitting* bench, const char* name, es_world** world)
 {
     const bool ring = !strncmp(name, "ring-", 5);
     if (es_world_create_scene(bench->context, ring ? "ring" : name, NULL, world) != ES_OK) return false;
     if (ring && !(hide_silk(*world) && polish_ring(*world, name + 5))) {
-        demo_refuse("bench micro: the scene ring has no silk or no bronze");
+        demo_refuse("bench: the scene ring has no silk or no bronze");
         return false;
     }
     return es_world_step(*world, 0) == ES_OK;
@@ -97,7 +97,7 @@ static float near_share(const es_bvh* bvh, es_vec3 place, const float* n, float 
 }
 
 /* Near: a quarter of the hemisphere ends within 3 % of the scene's extent, or one ray of it within contact_reach. */
-static bool mark_pixels(micro_bench* bench, micro_stage* stage)
+static bool mark_pixels(bench_sitting* bench, sitting_stage* stage)
 {
     es_renderer_settings settings = es_default_renderer_settings();
     settings.width = bench->width;
@@ -129,15 +129,15 @@ static bool mark_pixels(micro_bench* bench, micro_stage* stage)
     return stage->contact != NULL;
 }
 
-bool micro_open_stage(micro_bench* bench, const char* name, micro_stage* stage)
+bool sitting_open_stage(bench_sitting* bench, const char* name, sitting_stage* stage)
 {
     char cache[DEMO_PATH_SIZE];
-    *stage = (micro_stage){0};
+    *stage = (sitting_stage){0};
     error_effort effort = {.width = bench->width, .height = bench->height, .samples = bench->truth_samples, .seconds = bench->truth_seconds};
     if (bench->options->out) {
         snprintf(cache, sizeof cache, "%.3900s/references", bench->options->out);
         if (mkdir(cache, 0777) == 0 || errno == EEXIST) {
-            snprintf(cache, sizeof cache, "%.3900s/references/micro-%.64s-%ux%u", bench->options->out, name, bench->width, bench->height);
+            snprintf(cache, sizeof cache, "%.3900s/references/stage-%.64s-%ux%u", bench->options->out, name, bench->width, bench->height);
             effort.cache = cache;
         }
     }
@@ -147,18 +147,18 @@ bool micro_open_stage(micro_bench* bench, const char* name, micro_stage* stage)
     return false;
 }
 
-void micro_close_stage(micro_bench* bench, micro_stage* stage)
+void sitting_close_stage(bench_sitting* bench, sitting_stage* stage)
 {
     if (stage->world) es_world_destroy(stage->world);
     error_truth_free(bench->context, &stage->truth);
     free(stage->contact);
-    *stage = (micro_stage){0};
+    *stage = (sitting_stage){0};
 }
 
 /* ---- a picture's error -------------------------------------------------------------------------------------------------------------- */
 
 /* As error_measure has relrmse: by the truth's two halves, so that its noise does not count. mask 0: all pixels. */
-static double relrmse(const es_image* image, const micro_stage* stage, uint8_t mask)
+static double relrmse(const es_image* image, const sitting_stage* stage, uint8_t mask)
 {
     double squares = 0, light = 0;
     size_t values = 0;
@@ -172,7 +172,7 @@ static double relrmse(const es_image* image, const micro_stage* stage, uint8_t m
     return values && squares > 0 ? sqrt(squares / (double)values) / (light / (double)values) : NAN;
 }
 
-bool micro_measure(micro_bench* bench, const micro_stage* stage, const char* text, micro_error* error)
+bool sitting_measure(bench_sitting* bench, const sitting_stage* stage, const char* text, sitting_error* error)
 {
     enum { MOST = 8 };
     double times[MOST];
@@ -198,7 +198,7 @@ bool micro_measure(micro_bench* bench, const micro_stage* stage, const char* tex
     }
     works = works && es_renderer_image(renderer, "indirect", &indirect) == ES_OK;
     if (works) {
-        *error = (micro_error){relrmse(&indirect, stage, 0), relrmse(&indirect, stage, 1), relrmse(&indirect, stage, 2), bench_median(times, frames)};
+        *error = (sitting_error){relrmse(&indirect, stage, 0), relrmse(&indirect, stage, 1), relrmse(&indirect, stage, 2), bench_median(times, frames)};
         fprintf(stderr, "  %s: %.4g ms, relRMSE %.4f, %.4f in contact, %.4f glossy\n", text, error->milliseconds, error->all, error->contact, error->glossy);
     } else {
         demo_refuse_context(bench->context);
