@@ -42,6 +42,9 @@ static const benchmark benchmarks[] = {
     {"micro", bench_micro, bench_micro_rows, false},
     {"lamps", bench_lamps, bench_lamps_rows, false},
     {"screen", bench_screen, bench_screen_rows, false},
+    {"compensation", bench_compensation, bench_compensation_rows, false},
+    {"second-order", bench_second_order, bench_second_order_rows, false},
+    {"combinations", bench_combinations, bench_combinations_rows, false},
     {"scale", bench_scale, bench_scale_rows, false},
     {"speed", bench_speed, bench_speed_rows, true},
     {"frame", bench_frame, NULL, false},
@@ -51,7 +54,7 @@ static const benchmark benchmarks[] = {
     {"rays", bench_rays, bench_rays_rows, false},
     {"dynamics", bench_dynamics, bench_dynamics_rows, false},
 };
-enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0], MAX_ROWS = 256 };
+enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0], MAX_ROWS = 384 };
 
 const char* bench_name(size_t index) { return index < BENCHMARKS ? benchmarks[index].name : NULL; }
 

@@ -158,6 +158,15 @@ size_t bench_bounces_rows(bench_row* rows, size_t capacity);
 /* bench_screen.c */
 int bench_screen(const bench_options* options);
 size_t bench_screen_rows(bench_row* rows, size_t capacity);
+/* bench_compensation.c */
+int bench_compensation(const bench_options* options);
+size_t bench_compensation_rows(bench_row* rows, size_t capacity);
+/* bench_second_order.c */
+int bench_second_order(const bench_options* options);
+size_t bench_second_order_rows(bench_row* rows, size_t capacity);
+/* bench_combinations.c */
+int bench_combinations(const bench_options* options);
+size_t bench_combinations_rows(bench_row* rows, size_t capacity);
 /* bench_micro.c */
 int bench_micro(const bench_options* options);
 size_t bench_micro_rows(bench_row* rows, size_t capacity);

@@ -416,6 +416,13 @@ expect 0 bench micro --quick --no-peer --size 48x32 --spp 2 --threads 2 --out fi
 says '^micro-error-cornell +[0-9.]+ relRMSE'
 expect 0 bench lamps --quick --size 48x32 --spp 2 --threads 2 --only lamps-curved-512 --only lamps-sky-error-maps
 says '^lamps-curved-512 +[0-9.]+ ms '
+expect 0 bench compensation --quick --threads 2 --only compensation-step-cornell --only compensation-samples --only compensation-energy-layers-crease-3 --out figures
+says '^compensation-samples +[0-9.]+ patches +[0-9.]+ '
+says '^compensation-energy-layers-crease-3 +[0-9.]+ % '
+expect 0 bench second-order --quick --threads 2 --out figures
+says '^second-order-low-share +[0-9.]+ % '
+expect 0 bench combinations --quick --size 48x32 --spp 2 --threads 2 --only combinations-crease
+says '^combinations-crease +[0-9.]+ relRMSE +[0-9.]+ +[0-9.]+x '
 expect 0 bench scale --quick --only scale-threads --size 64x48 --threads 2 --out figures
 says '^scale-threads +[0-9.]+ x '
 refused '--spp 1' bench error --spp 1
@@ -432,7 +439,7 @@ if command -v python3 >/dev/null; then
     checks=$((checks + 1))
     python3 - <<'PYTHON' >out 2>err || fail 'the files of bench are not as described'
 import glob, json, re, xml.etree.ElementTree as tree
-for name in ('speed', 'frame', 'error', 'micro', 'scale', 'ledger'):
+for name in ('speed', 'frame', 'error', 'micro', 'compensation', 'second-order', 'scale', 'ledger'):
     report = json.load(open(f'figures/{name}.json'))
     assert set(report['machine']) >= {'processor', 'isa', 'threads', 'compiler', 'commit'}, report['machine']
     assert report['date'].startswith('20') and report['rows'], report
@@ -464,7 +471,7 @@ for drawing in glob.glob('figures/*.svg'):
     tree.parse(drawing)
 text = open('figures/index.html').read()
 page = tree.fromstring(text)  # well-formed as XML too
-assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'bounces', 'micro', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
+assert [s.get('id') for s in page.iter('section')] == ['error', 'ledger', 'bounces', 'micro', 'compensation', 'second-order', 'scale', 'speed', 'frame'], 'a run keeps the sections of others'
 names = {element.tag for element in page.iter()}
 assert not names & {'script', 'link', 'iframe', 'object', 'image', 'use'}, names
 assert not re.search(r'https?:|url\(|@import|src="(?!data:image/png;base64,)', text), 'the page loads something'
