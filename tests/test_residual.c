@@ -279,10 +279,46 @@ static void test_parts_add_up(void** state)
     es_context_destroy(context);
 }
 
+/* With one bounce, what is found is of it alone: direct light is sent, whose every patch is known, and other virtual point lights change nothing. With two,
+ * bounded light of the first bounce is sent as well, and what is found grows. */
+static void test_of_one_bounce(void** state)
+{
+    (void)state;
+    es_context* context;
+    es_world* world;
+    es_renderer* renderer;
+    assert_int_equal(es_context_create(NULL, &context), ES_OK);
+    es_world_settings coarse = es_default_world_settings();
+    coarse.triangles = 2000;
+    assert_int_equal(es_world_create_scene(context, "cornell", &coarse, &world), ES_OK);
+    es_renderer_settings settings = es_default_renderer_settings();
+    settings.width = 96;
+    settings.height = 72;
+    settings.ism_points = 256;
+    settings.geometry_bound = 200;
+    settings.compensation_steps = 1;
+    es_image found[3];
+    for (uint32_t i = 0; i < 3; i++) {
+        settings.vpls = i == 1 ? 96 : 64;
+        settings.bounces = i == 2 ? 2 : 1;
+        if (i) assert_int_equal(es_renderer_configure(renderer, &settings), ES_OK);
+        else assert_int_equal(es_renderer_create(context, &settings, &renderer), ES_OK);
+        assert_int_equal(es_renderer_render(renderer, world), ES_OK);
+        found[i] = picture(renderer, "compensation-1");
+    }
+    assert_memory_equal(found[0].pixels, found[1].pixels, (size_t)settings.width * settings.height * 3 * sizeof(float));
+    assert_true(mean(&found[0]) > 0 && mean(&found[2]) > 1.02 * mean(&found[0]));
+    for (uint32_t i = 0; i < 3; i++) es_image_destroy(context, &found[i]);
+    es_renderer_destroy(renderer);
+    es_world_destroy(world);
+    es_context_destroy(context);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         unit_test_without_races(test_corner), unit_test_without_races(test_samples), unit_test_without_races(test_each_for_itself), cmocka_unit_test(test_kernels), unit_test_without_races(test_parts_add_up),
+        unit_test_without_races(test_of_one_bounce),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

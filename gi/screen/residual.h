@@ -4,7 +4,8 @@
  * With the residual operator T_r, which is transport with max(0, G - b) in place of G,
  *     L = L_e + T L_e + T_b L^ + T_r (L - L_e)                                                      §3.2
  * is iterated: step 1 applies T_r to direct and bounded indirect light, step k + 1 to what step k brought. T_r is linear, so steps add up to
- * Novák's eq. 3 after as many iterations, and each is an image of its own.
+ * Novák's eq. 3 after as many iterations, and each is an image of its own. With lights of a single bounce, what T_r makes of their bounded light
+ * would be of a second one: step 1 is applied to direct light alone then.
  *
  * The integral over surfaces becomes a sum over the pixels' patches (§4.1), none of them tested for visibility,
  *     sum of L A max(0, G' - b),  G' = cos cos / (d² + A / 2 pi)²  ·  d²,

@@ -28,6 +28,9 @@ void es_residual_buffers_free(es_context* context, es_residual_buffers* b)
     for (uint32_t i = 0; i < ES_RESIDUAL_STEPS; i++) es_planes_free(context, &b->steps[i]);
 }
 
+/* Bounded light of the first bounce, reflected once more, is of the second. */
+static bool sends_indirect(const es_renderer_settings* s) { return s->bounces > 1 && s->method != ES_GI_SECOND_ORDER; }
+
 /* Direct and bounded indirect light, as it leaves surfaces towards the eye. */
 static es_result compose_sent(es_renderer* r, es_planes* sent)
 {
@@ -36,6 +39,10 @@ static es_result compose_sent(es_renderer* r, es_planes* sent)
     es_compose_job job = es_renderer_compose_job(r);
     memset(job.finished, 0, sizeof job.finished);
     memset(job.further, 0, sizeof job.further);
+    if (!sends_indirect(&r->settings)) {
+        memset(job.irradiance, 0, sizeof job.irradiance);
+        memset(job.specular, 0, sizeof job.specular);
+    }
     for (int k = 0; k < 3; k++) job.reflected[k] = sent->at[k];
     es_compose(r->context, &job);
     return ES_OK;
@@ -166,13 +173,12 @@ es_result es_pass_residual(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     const es_pass direct[] = {ES_PASS_DIRECT, ES_PASS_LAMP_LIGHT, ES_PASS_LAMP_FILTER, ES_PASS_SCREEN_OCCLUSION, ES_PASS_SCREEN_VIEWS, ES_PASS_SHADOW_MAPS};
     for (size_t i = 0; i < sizeof direct / sizeof direct[0]; i++) es_plan_reads_pass(plan, direct[i]);
-    es_indirect_reads(plan);
-    es_plan_reads_pass(plan, ES_PASS_FILTER);
-    es_plan_reads_pass(plan, ES_PASS_TEMPORAL);
-    es_plan_reads_pass(plan, ES_PASS_UPSAMPLE);
+    if (sends_indirect(s)) es_indirect_reads(plan);
+    const es_pass indirect[] = {ES_PASS_FILTER, ES_PASS_TEMPORAL, ES_PASS_UPSAMPLE};
+    for (size_t i = 0; i < sizeof indirect / sizeof indirect[0] && sends_indirect(s); i++) es_plan_reads_pass(plan, indirect[i]);
     float numbers[] = {es_geometry_bound(s, in), s->lobe_roughness, s->compensation_solid_angle, s->compensation_discontinuity, r->has_specular};
     es_plan_reads(plan, numbers, sizeof numbers);
-    uint32_t words[] = {s->compensation_steps, s->compensation_levels, s->compensation_spacing};
+    uint32_t words[] = {s->compensation_steps, sends_indirect(s), s->compensation_levels, s->compensation_spacing};
     es_plan_reads(plan, words, sizeof words);
     if (!es_plan_run(plan, ES_PASS_RESIDUAL)) return ES_OK;
     uint64_t samples = 0;
