@@ -13,7 +13,7 @@
 typedef enum image_kind {
     IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_NEGATIVE, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
-    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_TRANSMITTANCE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
+    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_OPACITY, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
@@ -50,7 +50,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_LIGHT_NORMAL, "light-normal", "normal in the first light's G-buffer"},
     {IMAGE_IMPORTANCE, "importance", "where the first light's virtual point lights go (Knecht eq. 4.3)"},
     {IMAGE_ISM, "ism", "the first 64 shadow maps of the virtual point lights, 0 near, 1 far or empty"},
-    {IMAGE_TRANSMITTANCE, "transmittance", "share of what is behind blended surfaces that they let through, 0 to 1; 1 where there are none"},
+    {IMAGE_OPACITY, "opacity", "share of what is behind blended surfaces that they hide, 0 to 1; 0 where there are none"},
     {IMAGE_MICRO, "micro-buffer", "of the pixel in the middle: its lobe's where it has one"},
     {IMAGE_MICRO_UNWARPED, "micro-buffer-unwarped", "the same laid out over the hemisphere, the normal in the middle"},
     {IMAGE_MICRO_DISTANCE, "micro-buffer-distance", "how far away is what the micro-buffer shows, metres; 0 where nothing is"},
@@ -112,10 +112,10 @@ static float transmittance_at(const es_compose_layers* l, uint32_t stride, uint3
     return layered ? l->transmittance[(size_t)y * stride + x] : 1.0f;
 }
 
-static void put_transmittance(const es_compose_layers* l, uint32_t stride, es_image* image)
+static void put_opacity(const es_compose_layers* l, uint32_t stride, es_image* image)
 {
     for (uint32_t y = 0; y < image->height; y++)
-        for (uint32_t x = 0; x < image->width; x++) image->pixels[(size_t)y * image->width + x] = transmittance_at(l, stride, x, y);
+        for (uint32_t x = 0; x < image->width; x++) image->pixels[(size_t)y * image->width + x] = 1.0f - transmittance_at(l, stride, x, y);
 }
 
 /* A summand of the indirect light, as much of it as shows. */
@@ -314,7 +314,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         width = height = 8; /* a black image: the frame has no such thing */
         light = NULL;
     }
-    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION || kind == IMAGE_TRANSMITTANCE;
+    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION || kind == IMAGE_OPACITY;
     if (single) channels = 1;
     if (kind == IMAGE_MOTION) channels = 2;
     es_result result = es_image_create(context, width, height, channels, image);
@@ -344,9 +344,9 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         else if (planes[0]) put_planes(planes, g->stride, image);
         break;
     }
-    case IMAGE_TRANSMITTANCE: {
+    case IMAGE_OPACITY: {
         const es_compose_job job = es_renderer_compose_job(renderer);
-        put_transmittance(&job.layers, g->stride, image);
+        put_opacity(&job.layers, g->stride, image);
         break;
     }
     case IMAGE_OCCLUSION: es_screen_occlusion_image(renderer, image->pixels); break;
