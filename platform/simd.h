@@ -266,6 +266,15 @@ VINL vf vf_gather(const float* base, vi index)
                 base[index[4]], base[index[5]], base[index[6]], base[index[7]]};
 #endif
 }
+/* values[0], values[0], values[1], … : each 2 (shift 1) or 4 times (shift 2). Reads eight of them. */
+VINL vf vf_repeat(const float* values, uint32_t shift)
+{
+#if defined(ES_SIMD_256)
+    return (vf)_mm256_permutevar8x32_ps(_mm256_loadu_ps(values), _mm256_srlv_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_epi32((int)shift)));
+#else
+    return (vf){values[0], values[1 >> shift], values[2 >> shift], values[3 >> shift], values[4 >> shift], values[5 >> shift], values[6 >> shift], values[7 >> shift]};
+#endif
+}
 VINL vi vi_gather(const void* base_address, vi index)
 {
     const int32_t* base = base_address;

@@ -1,5 +1,5 @@
-/* From gathered pixels to all of them, along surfaces (gi/micro/upsample.h). What words of the G-buffer say is decoded for each pixel and each of its four
- * neighbours anew: about 30 loads of eight lanes each, where a pixel has light of the kind at all. */
+/* From gathered pixels to all of them, along surfaces (gi/micro/upsample.h). What words of the G-buffer say of gathered pixels is decoded once into lines of a
+ * block of columns, and stays there for all rows that lie between two of them. */
 #include <string.h>
 
 #include "gi/kernel_table.h"
@@ -67,22 +67,67 @@ VINL vf likeness(bool lobe, const place* p, const place* q, vf gx, vf gy, vf gz,
     return vf_and(q->seen, depth * depth * normal * vf_max(material, zero));
 }
 
-VINL void upsample_row(const es_micro_upsample_job* job, bool lobe, uint32_t y)
+/* A row of gathered pixels: what place_at says of them, and their light. Those after the last of the image repeat it. */
+enum { BLOCK_COLUMNS = 256, LINE = BLOCK_COLUMNS / 2 + 2 * VW, NO_ROW = -1 };
+typedef struct line {
+    int64_t row;
+    float x[LINE], y[LINE], z[LINE], nx[LINE], ny[LINE], nz[LINE], alpha[LINE], f90[LINE], reflectance[3][LINE], model[LINE], seen[LINE], source[3][LINE];
+} line;
+
+VINL void decode_line(const es_micro_upsample_job* job, bool lobe, uint32_t first, uint32_t row, line* l)
+{
+    const int shift = job->spacing == 4 ? 2 : 1;
+    const vi last = vi_set1((int32_t)job->sparse_width - 1);
+    const uint32_t whole_y = row << shift, count = (BLOCK_COLUMNS >> shift) + VW;
+    for (uint32_t i = 0; i < count && first + i < job->sparse_width + VW; i += VW) {
+        const vi column = vi_min(vi_set1((int32_t)(first + i)) + vi_iota(), last), whole_x = column << shift;
+        const place p = place_at(job, lobe, vf_from_int(whole_x), vf_set1((float)whole_y), vi_set1((int32_t)(whole_y * job->gbuffer->stride)) + whole_x);
+        vf_store(l->x + i, p.x);
+        vf_store(l->y + i, p.y);
+        vf_store(l->z + i, p.z);
+        vf_store(l->nx + i, p.nx);
+        vf_store(l->ny + i, p.ny);
+        vf_store(l->nz + i, p.nz);
+        vf_store(l->f90 + i, p.f90);
+        vf_store(l->seen + i, vf_from_bits(p.seen));
+        const vi at = vi_set1((int32_t)(row * job->sparse_stride)) + column;
+        for (int k = 0; k < 3; k++) vf_store(l->source[k] + i, vf_gather(job->source[k], at));
+        if (!lobe) continue;
+        vf_store(l->alpha + i, p.alpha);
+        vf_store(l->model + i, vf_from_bits(p.model));
+        for (int k = 0; k < 3; k++) vf_store(l->reflectance[k] + i, p.reflectance[k]);
+    }
+    l->row = row;
+}
+
+VINL place neighbours(const line* l, bool lobe, uint32_t at, uint32_t shift)
+{
+    place q = {.seen = vi_from_bits(vf_repeat(l->seen + at, shift)), .x = vf_repeat(l->x + at, shift), .y = vf_repeat(l->y + at, shift), .z = vf_repeat(l->z + at, shift), .nx = vf_repeat(l->nx + at, shift),
+        .ny = vf_repeat(l->ny + at, shift), .nz = vf_repeat(l->nz + at, shift), .f90 = vf_repeat(l->f90 + at, shift)};
+    if (lobe) {
+        q.alpha = vf_repeat(l->alpha + at, shift);
+        q.model = vi_from_bits(vf_repeat(l->model + at, shift));
+        for (int k = 0; k < 3; k++) q.reflectance[k] = vf_repeat(l->reflectance[k] + at, shift);
+    }
+    return q;
+}
+
+/* Columns from `begin`, a multiple of BLOCK_COLUMNS, of a row between two lines. */
+VINL void upsample_row(const es_micro_upsample_job* job, bool lobe, uint32_t begin, uint32_t y, const line* upper, const line* lower)
 {
     const es_gbuffer* g = job->gbuffer;
     const es_pixel_rays* r = &job->rays;
     const vf zero = vf_zero(), one = vf_set1(1.0f);
-    const int shift = job->spacing == 4 ? 2 : 1;
-    const uint32_t last_row = job->sparse_height - 1, upper = y >> shift, rows[2] = {upper, upper < last_row ? upper + 1 : last_row};
+    const uint32_t shift = job->spacing == 4 ? 2 : 1, end = g->width - begin < BLOCK_COLUMNS ? g->width : begin + BLOCK_COLUMNS;
+    const line* const lines[2] = {upper, lower};
     const float share = (float)(y & (job->spacing - 1)) / (float)job->spacing;
     /* beyond the last row there is nothing */
-    const float row_weight[2] = {1.0f - share, upper < last_row ? share : 0.0f};
+    const float row_weight[2] = {1.0f - share, lower != upper ? share : 0.0f};
     const vi last = vi_set1((int32_t)job->sparse_width - 1);
     const float step = es_sqrt(r->dir_dx[0] * r->dir_dx[0] + r->dir_dx[1] * r->dir_dx[1] + r->dir_dx[2] * r->dir_dx[2]);
     const float base_step = es_sqrt(r->base_dx[0] * r->base_dx[0] + r->base_dx[1] * r->base_dx[1] + r->base_dx[2] * r->base_dx[2]);
     uint8_t* lit = job->lit ? job->lit + (size_t)y * es_lit_chunks(g->stride) : NULL;
-    if (lit) memset(lit, 0, es_lit_chunks(g->stride));
-    for (uint32_t x = 0; x < g->width; x += VW) {
+    for (uint32_t x = begin; x < end; x += VW) {
         const size_t row = (size_t)y * g->stride;
         const vi column = vi_iota() + vi_set1((int32_t)x);
         vf sum[3] = {zero, zero, zero}, weights = zero;
@@ -93,22 +138,19 @@ VINL void upsample_row(const es_micro_upsample_job* job, bool lobe, uint32_t y)
             vf gx, gy, gz;
             es_unpack_normal_v(vi_load(g->geometric_normal + row + x), &gx, &gy, &gz);
             const vf width = vf_set1(ES_MICRO_PLANE * (float)job->spacing) * (vf_set1(base_step) + p.depth * vf_set1(step)), per_width = one / vf_max(width, vf_set1(1e-12f));
-            const vi left = vi_shift_right_logical(column, shift), offset = column & vi_set1((int32_t)job->spacing - 1);
+            const vi left = vi_shift_right_logical(column, (int)shift), offset = column & vi_set1((int32_t)job->spacing - 1);
             const vf column_share = vf_from_int(offset) * vf_set1(1.0f / (float)job->spacing);
-            const vi columns[2] = {left, vi_min(left + vi_set1(1), last)};
             const vf column_weight[2] = {one - column_share, vf_and(vi_lt(left, last), column_share)};
             for (int j = 0; j < 2; j++)
-                for (int i = 0; i < 2; i++) {
+                for (uint32_t i = 0; i < 2; i++) {
                     if (row_weight[j] == 0.0f) continue;
                     const vf bilinear = column_weight[i] * vf_set1(row_weight[j]);
-                    const vi whole_x = columns[i] << shift;
-                    const uint32_t whole_y = rows[j] << shift;
-                    const place q = place_at(job, lobe, vf_from_int(whole_x), vf_set1((float)whole_y), vi_set1((int32_t)(whole_y * g->stride)) + whole_x);
+                    const uint32_t at = ((x - begin) >> shift) + i;
+                    const place q = neighbours(lines[j], lobe, at, shift);
                     const vf weight = bilinear * likeness(lobe, &p, &q, gx, gy, gz, per_width);
-                    const vi at = vi_set1((int32_t)(rows[j] * job->sparse_stride)) + columns[i];
                     weights = weights + weight;
                     for (int k = 0; k < 3; k++) {
-                        vf value = vf_gather(job->source[k], at);
+                        vf value = vf_repeat(lines[j]->source[k] + at, shift);
                         if (lobe) value = value * (p.reflectance[k] / q.reflectance[k]);
                         sum[k] = sum[k] + weight * value;
                     }
@@ -123,10 +165,26 @@ VINL void upsample_row(const es_micro_upsample_job* job, bool lobe, uint32_t y)
     }
 }
 
+VINL void upsample_block(const es_micro_upsample_job* job, bool lobe, uint32_t begin, uint32_t row_begin, uint32_t row_end)
+{
+    const uint32_t shift = job->spacing == 4 ? 2 : 1, last = job->sparse_height - 1;
+    line lines[2];
+    lines[0].row = lines[1].row = NO_ROW;
+    for (uint32_t y = row_begin; y < row_end; y++) {
+        const uint32_t upper = y >> shift, lower = upper < last ? upper + 1 : last;
+        if (lines[upper % 2].row != upper) decode_line(job, lobe, begin >> shift, upper, &lines[upper % 2]);
+        /* a row of gathered pixels needs no other */
+        if (y & (job->spacing - 1) && lines[lower % 2].row != lower) decode_line(job, lobe, begin >> shift, lower, &lines[lower % 2]);
+        upsample_row(job, lobe, begin, y, &lines[upper % 2], &lines[lower % 2]);
+    }
+}
+
 void ES_KERNEL(es_gi_micro_upsample)(const es_micro_upsample_job* job, uint32_t row_begin, uint32_t row_end)
 {
-    for (uint32_t y = row_begin; y < row_end; y++) {
-        if (job->kind == ES_GATHER_LOBE) upsample_row(job, true, y);
-        else upsample_row(job, false, y);
+    const es_gbuffer* g = job->gbuffer;
+    if (job->lit) memset(job->lit + (size_t)row_begin * es_lit_chunks(g->stride), 0, (size_t)(row_end - row_begin) * es_lit_chunks(g->stride));
+    for (uint32_t x = 0; x < g->width; x += BLOCK_COLUMNS) {
+        if (job->kind == ES_GATHER_LOBE) upsample_block(job, true, x, row_begin, row_end);
+        else upsample_block(job, false, x, row_begin, row_end);
     }
 }
