@@ -567,8 +567,12 @@ static void test_alpha_plane(void** state)
 {
     (void)state;
     small_world w = small_world_create();
-    static const float alphas[6][2] = {{0.25f, 0.25f}, {3, 1}, {-2, 0}, {NAN, 0}, {INFINITY, 1}, {-INFINITY, 0}};
-    for (int i = 0; i < 6; i++) {
+    static const float alphas[][2] = {{0.25f, 0.25f}, {3, 1}, {-2, 0},
+#if !defined(ES_TRAP_FP) /* what is no number stops there */
+        {NAN, 0}, {INFINITY, 1}, {-INFINITY, 0}
+#endif
+    };
+    for (size_t i = 0; i < sizeof alphas / sizeof alphas[0]; i++) {
         float positions[4 * 8] = {-1, -1, -2, 1, 1, -1, -2, 1, 0, 1, -2, 1}, colors[4 * 8] = {0};
         for (int v = 0; v < 3; v++) colors[4 * v + 3] = alphas[i][0];
         static const uint32_t indices[4] = {0, 1, 2, 0};

@@ -76,6 +76,7 @@ typedef struct bench {
     es_world* world;
     es_node node;         /* of the sphere */
     es_mesh sphere;
+    es_material painted;  /* its */
     es_image a, b;        /* two pictures of one size */
     es_renderer* renderer;
     uint64_t result;      /* of an operation that keeps nothing */
@@ -121,12 +122,13 @@ static uint64_t hash_of_folder(void)
     return hash;
 }
 
-static es_result add_object(bench* w, const es_mesh_desc* mesh, const es_material_desc* material, es_node node, es_mesh* made)
+static es_result add_object(bench* w, const es_mesh_desc* mesh, const es_material_desc* material, es_node node, es_mesh* made, es_material* used)
 {
-    es_material m;
+    es_material m = {0};
     es_instance instance;
     es_result result = es_world_add_mesh(w->world, mesh, made);
     if (!result) result = es_world_add_material(w->world, "m", material, &m);
+    if (used) *used = m;
     return result ? result : es_world_add_instance(w->world, &(es_instance_desc){.mesh = *made, .material = m, .node = node}, &instance);
 }
 
@@ -171,10 +173,10 @@ static es_result make_world(bench* w)
     if (!result) {
         painted.base_color_texture = (es_texture_use){.image = es_world_texture_image(w->world, texture), .matrix = {1, 0, 0, 1}};
         result = add_object(w, &(es_mesh_desc){.name = "ball", .vertex_count = (SEGMENTS + 1) * (SEGMENTS + 1), .triangle_count = n / 3, .positions = ball[0], .uv0 = uvs[0],
-                                   .indices = indices}, &painted, w->node, &w->sphere);
+                                   .indices = indices}, &painted, w->node, &w->sphere, &w->painted);
     }
-    if (!result) result = add_object(w, &(es_mesh_desc){.vertex_count = 8, .triangle_count = 8, .positions = box[0], .indices = sides, .flat_normals = true}, &gray, (es_node){0}, &mesh);
-    if (!result) result = add_object(w, &(es_mesh_desc){.vertex_count = 8, .triangle_count = 2, .positions = box[0], .indices = ceiling, .flat_normals = true}, &lamp, (es_node){0}, &mesh);
+    if (!result) result = add_object(w, &(es_mesh_desc){.vertex_count = 8, .triangle_count = 8, .positions = box[0], .indices = sides, .flat_normals = true}, &gray, (es_node){0}, &mesh, NULL);
+    if (!result) result = add_object(w, &(es_mesh_desc){.vertex_count = 8, .triangle_count = 2, .positions = box[0], .indices = ceiling, .flat_normals = true}, &lamp, (es_node){0}, &mesh, NULL);
     if (!result) result = es_world_add_node(w->world, &front, &lens.node);
     if (!result) result = es_world_add_camera(w->world, &lens, &camera);
     if (!result) result = es_world_add_node(w->world, &(es_node_desc){.transform = {.translation = {1, 2.6f, 1}}}, &spot.node);
@@ -740,6 +742,23 @@ static es_result frame_under_sky(bench* w, const operation* o, void** object)
     return result ? result : es_renderer_render(*object, w->world);
 }
 
+/* A ball that is seen through, lit by all that lights the picture. */
+static es_result frame_blended(bench* w, const operation* o, void** object)
+{
+    es_material_desc material;
+    es_result result = es_world_get_material(w->world, w->painted, &material);
+    material.blend = true;
+    material.base_color[3] = 0.6f;
+    if (!result) result = es_world_set_material(w->world, w->painted, &material);
+    es_renderer_settings settings = small_settings();
+    settings.lamps = ES_LAMPS_MAPS;
+    settings.blend_layers = 3;
+    settings.bounces = 2;
+    settings.bounce_vpls = 8;
+    if (!result && !*object) result = es_renderer_create(w->context, &settings, (es_renderer**)object);
+    return result ? result : es_renderer_render(*object, w->world);
+}
+
 /* After a frame everything has its memory; another size and a moved ball want more of it. */
 static es_result next_frame_prepare(bench* w, const operation* o, void** object)
 {
@@ -916,6 +935,7 @@ static const operation operations[] = {
     {"restore a world", WORLD, restore_prepare, restore, bench_hash, free_object},
     {"frame, none", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_NONE},
     {"frame, sky", WORLD, NULL, frame_under_sky, frame_hash, renderer_destroy, NULL},
+    {"frame, blended", WORLD, NULL, frame_blended, frame_hash, renderer_destroy, NULL},
     {"frame, ism", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_ISM},
     {"frame, classic", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_CLASSIC},
     {"frame, vpl-traced", WORLD, NULL, frame, frame_hash, renderer_destroy, NULL, ES_GI_VPL_TRACED},
