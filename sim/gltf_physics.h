@@ -3,22 +3,12 @@
 #ifndef EARTHSHINE_SIM_GLTF_PHYSICS_H
 #define EARTHSHINE_SIM_GLTF_PHYSICS_H
 
+#include "sim/gltf_values.h"
 #include "sim/sim.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-/* Values of the file's JSON, held by whoever parsed it; NULL stands for what is absent. */
-typedef struct es_gltf_values {
-    const void* (*member)(const void* object, const char* name);   /* NULL also when it is no object */
-    const void* (*element)(const void* array, size_t index);
-    bool (*is_object)(const void* value);
-    bool (*array_length)(const void* value, size_t* length);       /* false: no array; and so on */
-    bool (*number)(const void* value, double* number);
-    bool (*boolean)(const void* value, bool* boolean);
-    const char* (*string)(const void* value);
-} es_gltf_values;
 
 typedef struct es_gltf_physics_node {
     const void* rigid;        /* the node's KHR_physics_rigid_bodies */

@@ -22,10 +22,9 @@
 /* these first: the headers below include them too, and they know nothing of C++ */
 extern "C" {
 #include "platform/context.h"
-#include "platform/image_files.h"
 #include "platform/maths.h"
 }
-#include "sim/environment.h"
+#include "sim/gltf_environment.h"
 #include "sim/gltf_file.h"
 #include "sim/gltf_physics.h"
 #include "sim/world.h"
@@ -63,7 +62,7 @@ template <class T> struct counted {
 };
 template <class T> using list = std::vector<T, counted<T>>;
 
-/* ---- values of extensions and extras, for sim/gltf_physics.c --------------------------------------------------------------- */
+/* ---- values of extensions and extras (sim/gltf_values.h) --------------------------------------------------------------- */
 
 const tinygltf::Value* value_at(const void* value) { return static_cast<const tinygltf::Value*>(value); }
 
@@ -1474,70 +1473,28 @@ class importer
 
     /* ---- EXT_lights_image_based ------------------------------------------------------------------------------------------------------------ */
 
-    struct cube {
-        es_context* context;
-        es_image faces[6];
-        ~cube()
-        {
-            for (es_image& face : faces) { es_image_destroy(context, &face); }
-        }
+    struct cube : es_gltf_environment {
+        ~cube() { es_gltf_environment_free(this); }
     };
 
-    /* sRGB, and divided by alpha: what has none is opaque ("RGBD"). */
-    void add_face(size_t i, const std::string& where, es_image& face)
-    {
-        with_image(index(static_cast<int>(i), document.image_count, where), [&](const es_gltf_image_header& header, const unsigned char* rgba) {
-            if (header.width != header.height) { refuse(ES_FILE_DAMAGED, "%s: its image is %u x %u pixels, a cube's face must be square", where.c_str(), header.width, header.height); }
-            if (header.width > ES_ENVIRONMENT_MAX_WIDTH / 2) {
-                refuse(ES_IMAGE_SIZE, "%s: its image is %u x %u pixels, at most %d are read", where.c_str(), header.width, header.height, ES_ENVIRONMENT_MAX_WIDTH / 2);
-            }
-            check(es_image_create(context, header.width, header.height, 3, &face));
-            float linear[256];
-            for (int code = 0; code < 256; code++) { linear[code] = static_cast<float>(es_srgb_decode(code / 255.0)); }
-            for (size_t p = 0; p < static_cast<size_t>(header.width) * header.height; p++) {
-                float alpha = static_cast<float>(rgba[4 * p + 3]) * (1.0f / 255.0f);
-                for (size_t k = 0; k < 3; k++) { face.pixels[3 * p + k] = alpha > 0.0f ? linear[rgba[4 * p + k]] / alpha : 0.0f; }
-            }
-        });
-    }
-
-    /* Of the prefiltered levels the first is the environment itself; the others, and the coefficients of its irradiance, are made of it where they are wanted. */
     void add_environment()
     {
         if (model.scenes.empty()) { return; }
-        size_t scene = model.defaultScene < 0 ? 0 : index(model.defaultScene, model.scenes.size(), "scene");
-        const tinygltf::Value* use = extension(model.scenes[scene].extensions, "EXT_lights_image_based");
-        if (!use) { return; }
-        std::string where = at("scenes", scene) + ".extensions.EXT_lights_image_based";
-        const tinygltf::Value *which = member(*use, "light"), *root = extension(model.extensions, "EXT_lights_image_based"), *list = root ? member(*root, "lights") : nullptr;
-        if (!which || !which->IsInt()) { refuse(ES_FILE_DAMAGED, "%s.light: must be a whole number", where.c_str()); }
-        if (!list || !list->IsArray()) { refuse(ES_FILE_DAMAGED, "extensions.EXT_lights_image_based.lights: must be an array"); }
-        size_t i = index(which->GetNumberAsInt(), list->ArrayLen(), where + ".light");
-        where = at("extensions.EXT_lights_image_based.lights", i);
-        const tinygltf::Value& light = list->Get<tinygltf::Value::Array>()[i];
-        if (!light.IsObject()) { refuse(ES_FILE_DAMAGED, "%s: must be an object", where.c_str()); }
-        const tinygltf::Value* levels = member(light, "specularImages");
-        where += ".specularImages";
-        if (!levels || !levels->IsArray() || levels->ArrayLen() < 1) { refuse(ES_FILE_DAMAGED, "%s: must be an array of levels", where.c_str()); }
-        const tinygltf::Value& first = levels->Get<tinygltf::Value::Array>()[0];
-        if (!first.IsArray() || first.ArrayLen() != 6) { refuse(ES_FILE_DAMAGED, "%s[0]: must be an array of six images", where.c_str()); }
-        cube six{context, {}};
+        cube from{};
+        from.context = context;
+        from.path = path;
+        from.values = &gltf_values;
+        from.scene = model.defaultScene < 0 ? 0 : index(model.defaultScene, model.scenes.size(), "scene");
+        from.use = extension(model.scenes[from.scene].extensions, "EXT_lights_image_based");
+        from.root = extension(model.extensions, "EXT_lights_image_based");
+        from.image_count = document.image_count;
+        if (!from.use) { return; }
+        check(es_gltf_environment_read(&from));
         for (size_t face = 0; face < 6; face++) {
-            const tinygltf::Value& image = first.Get<tinygltf::Value::Array>()[face];
-            std::string place = where + "[0][" + std::to_string(face) + "]";
-            if (!image.IsInt() || image.GetNumberAsInt() < 0) { refuse(ES_FILE_DAMAGED, "%s: must be the number of an image", place.c_str()); }
-            add_face(static_cast<size_t>(image.GetNumberAsInt()), place, six.faces[face]);
-            if (six.faces[face].width != six.faces[0].width) { refuse(ES_FILE_DAMAGED, "%s: is not as large as the cube's other faces", place.c_str()); }
+            with_image(from.images[face], [&](const es_gltf_image_header& header, const unsigned char* rgba) { check(es_gltf_environment_face(&from, face, &header, rgba)); });
         }
-        where = at("extensions.EXT_lights_image_based.lights", i);
-        float rotation[4] = {0, 0, 0, 1}, intensity = extension_number(light, "intensity", 1.0, 0.0, 1e6, where);
-        extension_numbers(light, "rotation", 4, -1.0001, 1.0001, where, rotation);
-        cube picture{context, {}};
-        es_quat turn = es_quat_normalize({rotation[0], rotation[1], rotation[2], rotation[3]});
-        if (!es_environment_from_cube(context, six.faces, turn, &picture.faces[0])) { throw refusal{es_context_last_result(context)}; }
-        es_environment_desc desc{&picture.faces[0], {intensity, intensity, intensity}, 0.0f};
-        check(es_world_set_environment(world, &desc));
-        if (intensity > 0.0f) { needs_light = false; }
+        check(es_gltf_environment_set(&from, world));
+        if (from.intensity > 0.0f) { needs_light = false; }
     }
 
     bool needs_light = false;
