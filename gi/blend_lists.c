@@ -38,6 +38,13 @@ es_result es_blend_lists_make(es_context* context, es_blend_lists* lists, const 
     mask_materials(of_solid, world, ES_BLEND_MOST);
     mask_materials(of_layers, world, ES_BLEND_LEAST);
     uint32_t lights = 0, solids = 0, layered = 0;
+    /* masks are looked up pixel by pixel: not where they have no hole */
+    for (uint32_t i = 0; i < world->material_count; i++) of_layers[i].blend = false;
+    for (uint32_t i = 0; i < count; i++) {
+        const es_raster_instance* instance = &world->instances[i];
+        const es_material_desc* m = &world->materials[instance->material];
+        if (m->blend && !stays_above(instance, m, ES_BLEND_LEAST)) of_layers[instance->material].blend = true;
+    }
     for (uint32_t i = 0; i < count; i++) {
         const es_raster_instance* instance = &world->instances[i];
         const es_material_desc* m = &world->materials[instance->material];
