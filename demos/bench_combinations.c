@@ -9,15 +9,14 @@ static const bench_row table[] = {SCENE("crease"), SCENE("room"), SCENE("bunny-b
 
 size_t bench_combinations_rows(bench_row* rows, size_t capacity) { return bench_copy_rows(table, sizeof table / sizeof table[0], rows, capacity); }
 
-enum { ALONE, NEAR, BOUNCE, COMPENSATION, LOW_COMPENSATION, BOUNCE_REPAIR, COMPENSATION_REPAIR, MICRO, WAYS };
+enum { ALONE, NEAR, BOUNCE, COMPENSATION, BOUNCE_REPAIR, COMPENSATION_REPAIR, MICRO, WAYS };
 static const struct { const char *name, *settings; } ways[WAYS] = {
     [ALONE] = {"lights", "gi=ism"},
     [NEAR] = {"bounce alone", "gi=none screen.bounce=true"},
     [BOUNCE] = {"+ bounce", "gi=ism screen.bounce=true"},
     [COMPENSATION] = {"+ compensation", "gi=ism compensation.steps=1"},
-    [LOW_COMPENSATION] = {"with vpl.bound 400", "gi=ism compensation.steps=1 vpl.bound=400"}, /* as low as the bounce has it */
     [BOUNCE_REPAIR] = {"+ bounce, repair", "gi=ism screen.bounce=true screen.repair=4"},
-    [COMPENSATION_REPAIR] = {"+ compensation, bound 400, repair", "gi=ism compensation.steps=1 vpl.bound=400 screen.repair=4"},
+    [COMPENSATION_REPAIR] = {"+ compensation, repair", "gi=ism compensation.steps=1 screen.repair=4"},
     [MICRO] = {"micro-buffers, which are combined with nothing,", "gi=micro"},
 };
 

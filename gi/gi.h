@@ -200,8 +200,9 @@ typedef struct es_renderer_settings {
     uint32_t second_negative;        /* negative ones (150) */
     float second_threshold;          /* gi/second_order.h: pixels whose neighbours at half the resolution differ by so much or more are lit at their own; 0: all */
     /* bias compensation in screen space (Novák et al. 2011), with the methods that have virtual point lights: what geometry_bound takes from their light is found
-     * again among the pixels; spread does not apply then, and with near_distance or another traced_bias than BOUNDED there is nothing to be found. Of
-     * screen_layers behind the first the direct light is sent as well; bounded indirect light is sent with two bounces or more, for what it lights is one bounce further */
+     * again among the pixels. Spread does not apply then, and geometry_bound is 1 / screen_radius² at the most, so that lights are no spots close by; with near_distance
+     * or another traced_bias than BOUNDED there is nothing to be found. Of screen_layers behind the first the direct light is sent as well; bounded indirect light is
+     * sent with two bounces or more, for what it lights is one bounce further */
     uint32_t compensation_steps;     /* 0: none; … ES_MAX_COMPENSATION_STEPS: times that the residual operator is applied; those after the first find light of further bounces */
     uint32_t compensation_levels;    /* of the pyramid of pixels, 1 … 8 (§6: 6) */
     float compensation_solid_angle;  /* projected, sr, above which a node of it is opened (§4.2: 0.08) … */

@@ -22,10 +22,12 @@
 
 /* ---- planes ------------------------------------------------------------------------------------------------------------ */
 
-/* With a bounce in screen space no pair closer than its radius is left to the lights alone: without spread they would show as spots there. */
+/* Where screen space finds what bounding takes, no pair closer than its radius is left to the lights alone: without spread they would show as spots there. */
 float es_geometry_bound(const es_renderer_settings* settings, const es_frame_inputs* in)
 {
-    const float radius = settings->screen_radius, bound = settings->screen_bounce && es_residual_nothing(settings) ? es_minf(settings->geometry_bound, 1.0f / (radius * radius)) : settings->geometry_bound;
+    const float radius = settings->screen_radius;
+    const bool found = settings->screen_bounce || !es_residual_nothing(settings);
+    const float bound = found ? es_minf(settings->geometry_bound, 1.0f / (radius * radius)) : settings->geometry_bound;
     return bound / (in->extent * in->extent);
 }
 

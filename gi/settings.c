@@ -85,7 +85,7 @@ static const es_setting renderer_table[] = {
     {"second.negative", ES_SETTING_INT, "150", 0, 16384, NULL, "gi second-order: negative lights behind what the camera sees turned away from lights", AT(second_negative)},
     {"second.threshold", ES_SETTING_FLOAT, "0.02", 0, 1000, NULL, "gi second-order: how far normals and planes differ where half the resolution will not do; 0: it never does", AT(second_threshold)},
 
-    {"compensation.steps", ES_SETTING_INT, "0", 0, ES_RESIDUAL_STEPS, NULL, "what vpl.bound takes from lights is found in screen space, so many bounces of it, and vpl.spread does not apply; 0: not", AT(compensation_steps)},
+    {"compensation.steps", ES_SETTING_INT, "0", 0, ES_RESIDUAL_STEPS, NULL, "what vpl.bound, or 1 over the square of screen.radius, takes from lights is found in screen space, so many bounces of it; vpl.spread does not apply; 0: not", AT(compensation_steps)},
     {"compensation.levels", ES_SETTING_INT, "6", 1, ES_RESIDUAL_LEVELS, NULL, "levels of the pyramid of pixels: fewer take more samples", AT(compensation_levels)},
     {"compensation.solid-angle", ES_SETTING_FLOAT, "0.08", 0, 100, NULL, "projected solid angle above which a node of the pyramid is opened, sr", AT(compensation_solid_angle)},
     {"compensation.discontinuity", ES_SETTING_FLOAT, "0.04", 0, 100, NULL, "the same where it spans an edge", AT(compensation_discontinuity)},

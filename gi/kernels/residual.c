@@ -9,8 +9,9 @@
 #include "gi/kernels/surface_simd.h"
 #include "gi/screen/residual.h"
 
-/* Solid angle, without cosines, above which a node across an edge is opened: within about two of its widths. */
-#define CLOSE 0.25f
+/* Solid angle, without cosines, above which a node across an edge is opened: within about three of its widths. At 0.25 three steps in bunny-box bring 68 % of the energy
+ * back in place of 76; at 0.06, which takes about twice the time, 79. */
+#define CLOSE 0.12f
 /* How far parts of a node close by must rise above a receiver for the node to be opened, in its widths. */
 #define RISE 0.1f
 #define HALF_PER_PI 0.159154943f /* 1 / 2 pi */
