@@ -470,7 +470,7 @@ static void test_against_reference(void** state)
         es_reference_settings r = reference_settings(WIDTH, HEIGHT, 1);
         r.share = 8;
         r.emission = lamp;
-        es_reference* run = trace(&w, &r, 256 / FEWER);
+        es_reference* run = trace(&w, &r, 192 / FEWER);
         es_renderer_settings s = settings_of();
         s.method = ES_GI_CLASSIC;
         s.vpls = 512;
@@ -580,7 +580,7 @@ static void test_alpha_plane(void** state)
         const es_raster_mesh mesh = {.positions = positions, .colors = colors, .indices = indices, .vertex_count = 3, .triangle_count = 1, .bounds_min = {-1, -1, -2}, .bounds_max = {1, 1, -2}, .revision = 1};
         es_material_desc material = es_default_material_desc();
         material.blend = true;
-        material.alpha_cutoff = -4e38f; /* all of it */
+        material.alpha_cutoff = -3e38f; /* all of it */
         const es_raster_instance instance = {.mesh = &mesh, .transform = es_mat4_identity(), .previous_transform = es_mat4_identity()};
         const es_draw_list list = {&instance, &material, 1, 1};
         const es_raster_view view = es_perspective_view(16, 16, es_v3(0, 0, 0), es_v3(0, 0, -1), es_v3(0, 1, 0), 1.5f, 0.1f);
