@@ -11,8 +11,8 @@
 static const bench_row table[] = {
     {"lamps-curved-512", "creature in motion, lit by its curved area light alone: 512 lights, maps of 256² texels and 8192 points (fig. 5.16)", "ms", NULL, BENCH_VALUE_AT_MOST, 120, 59},
     {"lamps-sky-1024", "courtyard: 1024 lights of the sky, 8192 points each, nothing skipped", "ms", "as many virtual point lights", BENCH_NONE, 0, 0},
-    SKY_ERROR("lamps-sky-error", "512 lights by rays, 4 × 4", 0.08, 0.03),
-    SKY_ERROR("lamps-sky-error-all", "by rays, every light at every pixel", 0, 0),
+    SKY_ERROR("lamps-sky-error", "1024 lights by rays, 4 × 4", 0.08, 0.03),
+    SKY_ERROR("lamps-sky-error-all", "512 lights by rays, every light at every pixel", 0, 0),
     SKY_ERROR("lamps-sky-error-maps", "imperfect maps as they are by default", 0, 0),
     SKY_ERROR("lamps-sky-error-fine", "imperfect maps of 256² texels and 16384 points", 0, 0),
 };
@@ -198,7 +198,7 @@ static bool measure_error(lamp_bench* bench, es_world* world, const es_image hal
 static bool measure_errors(lamp_bench* bench)
 {
     static const char* const ways[][2] = {
-        {"lamps-sky-error", "lamps=traced lamps.count=512 lamps.interleave=4 filter.passes=1"},
+        {"lamps-sky-error", "lamps=traced lamps.count=1024 lamps.interleave=4 filter.passes=1"},
         {"lamps-sky-error-all", "lamps=traced lamps.count=512 lamps.interleave=1"},
         {"lamps-sky-error-maps", "lamps=maps"},
         {"lamps-sky-error-fine", "lamps=maps lamps.size=256 ism.points=16384 lamps.slope-bias=0.008"},

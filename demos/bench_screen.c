@@ -100,7 +100,7 @@ static bool measure_contact(bench_sitting* bench)
     sitting_stage stage;
     sitting_error alone, with;
     bool works = sitting_open_stage(&near, "crease", &stage) && sitting_measure(&near, &stage, "gi=ism vpl.count=1024", &alone) &&
-                 sitting_measure(&near, &stage, "gi=ism vpl.count=1024 vpl.bound=50 screen.repair=4 screen.layers=3 compensation.steps=1", &with);
+                 sitting_measure(&near, &stage, "gi=ism vpl.count=1024 vpl.bound=100 screen.repair=8 screen.layers=3 compensation.steps=1", &with);
     if (works) {
         row->value = with.contact;
         row->peer_value = alone.contact;
