@@ -212,6 +212,8 @@ int demo_parse_options(const char* command, int count, char** arguments, demo_op
         if (apply_option((enum option_id)id, value, options) != DEMO_OK) return DEMO_BAD_INPUT;
     }
     if (options->fps_given && options->replay) return demo_refuse("%s: --fps and --replay exclude each other; a replay's steps last as long as the recorded ones", command);
+    if (!options->environment && (options->environment_rotation != 0 || options->environment_intensity != 1))
+        return demo_refuse("%s: --environment-rotation and --environment-intensity need --environment FILE", command);
     if (options->record && options->replay) return demo_refuse("%s: --record and --replay exclude each other", command);
     return DEMO_OK;
 }

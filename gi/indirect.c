@@ -137,6 +137,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
     es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
     es_plan_reads_pass(plan, ES_PASS_BOUNCES);
+    if (s->screen_repair) es_plan_reads_pass(plan, ES_PASS_SCREEN_VIEWS);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
     const uint32_t interleave = interleave_of(s);
     float numbers[] = {s->ism_bias, s->ism_slope_bias, es_geometry_bound(s, in), es_vpl_spread(s), s->lobe_roughness, (float)interleave, in->extent, r->has_specular, unbounded, sampled, s->half_resolution, near_distance_of(r), (float)s->seed, (float)s->screen_repair, s->screen_radius};

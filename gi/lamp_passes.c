@@ -200,6 +200,7 @@ es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_LAMP_LIGHT);
     const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
+    if (s->screen_repair) es_plan_reads_pass(plan, ES_PASS_SCREEN_VIEWS);
     const float numbers[] = {s->lamp_slope_bias, s->lamp_roughness, (float)s->lamp_interleave, in->extent, r->lamps.has_specular, (float)s->lamps, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {

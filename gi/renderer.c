@@ -219,8 +219,8 @@ static es_result pass_visibility(es_renderer* r, const es_frame_inputs* in)
     uint64_t moving = in->revisions.moving ? in->revisions.steps : 0;
     es_plan_reads(&r->plan, &moving, sizeof moving);
     es_plan_reads(&r->plan, &in->has_environment, sizeof in->has_environment); /* which moves as well, see es_background_job */
-    const bool layers = r->settings.screen_layers > 1, blended = in->layers->instance_count > 0;
-    es_plan_reads(&r->plan, &layers, sizeof layers);
+    const bool blended = in->layers->instance_count > 0;
+    es_plan_reads(&r->plan, &r->settings.screen_layers, sizeof r->settings.screen_layers); /* what layers are peeled behind is noted as it is drawn */
     if (blended) es_plan_reads(&r->plan, &blended, sizeof blended);
     /* without layers blended surfaces are masked ones */
     const bool masked = r->settings.blend_layers == 0;
@@ -479,6 +479,7 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_DIRECT);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
+    if (r->settings.screen_repair) es_plan_reads_pass(plan, ES_PASS_SCREEN_VIEWS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
     float numbers[] = {(float)r->settings.shadow_filter, r->settings.shadow_bias, r->settings.shadow_slope_bias, (float)r->settings.screen_repair, r->settings.screen_repair_least * in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);

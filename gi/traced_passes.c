@@ -36,7 +36,7 @@ es_result es_pass_compensation(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     const es_renderer_settings* s = &r->settings;
-    const char* why = s->method == ES_GI_MICRO ? "gi is micro" : !plan->valid[ES_PASS_HIERARCHY] ? plan->stats[ES_PASS_HIERARCHY].skipped : s->traced_bias != ES_TRACED_COMPENSATED ? "traced.bias is not compensated" : NULL;
+    const char* why = s->method == ES_GI_MICRO ? "gi is micro" : s->method == ES_GI_SECOND_ORDER ? "gi is second-order" : in->no_vpls ? in->no_vpls : !r->first_vpls ? "the lights reach nothing" : !plan->valid[ES_PASS_HIERARCHY] ? plan->stats[ES_PASS_HIERARCHY].skipped : s->traced_bias != ES_TRACED_COMPENSATED ? "traced.bias is not compensated" : NULL;
     if (why) {
         es_plan_not_needed(plan, ES_PASS_COMPENSATION, why);
         return ES_OK;

@@ -30,7 +30,6 @@ static es_result set_environment(es_world* world, const char* label, const es_en
     es_environment_desc d = desc ? *desc : (es_environment_desc){0};
     const char* wrong = what_is_wrong(&d);
     if (wrong) return es_fail(world->context, ES_INVALID_ARGUMENT, "%s: %s", label, wrong);
-    world->sky.on = false;
     bool same_image = d.image == &world->environment_image, differs = !same_image && (d.image || world->environment_image.pixels);
     if (!same_image) {
         es_image copy = {0};
@@ -38,6 +37,7 @@ static es_result set_environment(es_world* world, const char* label, const es_en
         es_environment_free(world);
         world->environment_image = copy;
     }
+    world->sky.on = false;
     differs |= memcmp(world->environment_radiance, d.radiance, sizeof d.radiance) != 0 || memcmp(&world->environment_rotation, &d.rotation, sizeof d.rotation) != 0;
     memcpy(world->environment_radiance, d.radiance, sizeof d.radiance);
     world->environment_rotation = d.rotation;

@@ -276,7 +276,7 @@ ES_API es_result es_world_destroy_area_light(es_world* world, const es_area_ligh
 
 /* ---- environment: light from everywhere, infinitely far away --------------------------------------------------------------------------------- */
 
-/* A world has at most one. It lights the reference's paths; where nothing else is, it is what is seen by them and by the real-time methods. */
+/* A world has at most one. It lights the reference's paths and, with es_renderer_settings.lamps, real-time pictures; where nothing else is, it is what both see. */
 typedef struct es_environment_desc {
     const es_image* image;    /* lat-long, linear radiance, three channels or more: the row's centre has the elevation, top +y; the middle
                                * column looks along -z, columns to the right turn towards +x. Copied. NULL: the same radiance everywhere */
@@ -747,10 +747,10 @@ ES_API uint64_t es_world_object_hash(const es_world* world, es_object_kind kind,
 
 /* ---- recording and replay -------------------------------------------------------------------------------------------------------------------------- */
 
-/* A recording notes what its world is told between steps (transforms, cameras, lights, movers, clips, settings; poses, velocities, impulses,
+/* A recording notes what its world is told between steps (transforms, cameras, lights, movers, clips, settings, skies; poses, velocities, impulses,
  * forces and joints of bodies; hands; what is done to cloth; restored states), each step's dt, and hashes of what came of it. It begins
  * with a saved state, so it may begin at any time. Objects are not to be made or destroyed meanwhile, nor meshes, materials or environments
- * changed; what a step function does is not noted, as it is there again on replay. One thread at a time uses a recording and its world.
+ * changed, nor a sky ended; what a step function does is not noted, as it is there again on replay. One thread at a time uses a recording and its world.
  *
  * From the next step on. `scene` and `settings` are any texts by which the world can be opened again, NULL: "". WRONG_STATE while the world is
  * recorded already. The recording is destroyed by the caller, before or after its world. */

@@ -97,7 +97,10 @@ void es_sky_refresh(es_world* world)
         world->revisions.environment++;
     }
     /* the picture's middle, which is -z where nothing is turned, goes to the sun's azimuth */
-    const float rotation = (float)(-(double)turn * ES_SKY_STEP * DEGREE) + sky->desc.north, intensity = sky->desc.intensity;
+    float rotation = (float)(-(double)turn * ES_SKY_STEP * DEGREE) + sky->desc.north;
+    const float whole_turn = 2.0f * ES_PI, intensity = sky->desc.intensity;
+    /* of any north it stays within what an environment may be turned by */
+    if (rotation > whole_turn || rotation < -whole_turn) rotation -= whole_turn * (float)(int32_t)(rotation / whole_turn);
     const float radiance[3] = {intensity, intensity, intensity};
     if (sky->drawn && rotation == world->environment_rotation && memcmp(radiance, world->environment_radiance, sizeof radiance) == 0) return;
     sky->drawn = true;

@@ -363,9 +363,68 @@ static void test_bits(void** state)
     }
 }
 
+/* Whatever is changed between frames, a picture whose passes were kept is what doing all of them again gives. */
+static void test_changes(void** state)
+{
+    (void)state;
+    static const char* const changes[][5] = {
+        {"screen.layers=2", "lamps=screen", "screen.bounce=true"}, {"screen.layers=4"}, {"screen.layers=3"}, {"screen.layers=2", "screen.repair=8", "screen.repair-least=0.2"}, {"screen.layers=4"}, {"lamps=maps"},
+        {"screen.layers=2"}, {"compensation.steps=1", "vpl.bound=50"}, {"screen.layers=4"}, {"lamps=traced", "traced.bias=compensated", "traced.samples=2"}, {"gi=none"}, {"gi=second-order"}, {"gi=ism", "bounces=0"}, {"bounces=1"}};
+    enum { W = 50, H = 37 };
+    static const char* const images[] = {"direct", "lamps", "indirect", "occlusion", "compensation", "radiance"};
+    small_world w = small_world_create();
+    const es_material_desc grey = lambert(0.6f, 0);
+    es_light_desc lamp = es_default_light_desc();
+    add_floor(&w, 2, &grey);
+    for (int i = 0; i < 4; i++) add_block(&w, es_v3(-0.5f + 0.25f * (float)i, 0, -0.5f + 0.2f * (float)i), es_v3(0.05f, 0.3f, 0.05f), &grey);
+    lamp.intensity = 30;
+    add_light(&w, lamp, es_v3(1, 2, 1.5f), es_v3(-1, -2, -1.5f));
+    assert_int_equal(es_world_set_environment(w.world, &(es_environment_desc){.radiance = {0.5f, 0.7f, 1}}), ES_OK);
+    look(&w, eye(0.8f), es_v3(0.2f, 0.5f, 1.5f), es_v3(0, 0.1f, 0));
+    es_renderer* renderers[2];
+    for (int i = 0; i < 2; i++) {
+        es_renderer_settings s = es_default_renderer_settings();
+        s.width = W;
+        s.height = H;
+        s.vpls = 64;
+        s.ism_pool = 16384;
+        s.ism_points = 512;
+        s.light_size = 64;
+        s.skip = !i;
+        assert_int_equal(es_renderer_create(w.context, &s, &renderers[i]), ES_OK);
+    }
+    for (size_t c = 0; c < sizeof changes / sizeof changes[0]; c++) {
+        for (int i = 0; i < 2; i++) {
+            es_renderer_settings s = es_renderer_get_settings(renderers[i]);
+            for (int k = 0; k < 5 && changes[c][k]; k++) {
+                char name[64];
+                const char* equals = strchr(changes[c][k], '=');
+                snprintf(name, sizeof name, "%.*s", (int)(equals - changes[c][k]), changes[c][k]);
+                assert_int_equal(es_renderer_settings_set(w.context, &s, name, equals + 1), ES_OK);
+            }
+            assert_int_equal(es_renderer_configure(renderers[i], &s), ES_OK);
+            assert_int_equal(es_renderer_render(renderers[i], w.world), ES_OK);
+        }
+        for (size_t k = 0; k < sizeof images / sizeof images[0]; k++) {
+            es_image kept, done;
+            assert_int_equal(es_renderer_image(renderers[0], images[k], &kept), ES_OK);
+            assert_int_equal(es_renderer_image(renderers[1], images[k], &done), ES_OK);
+            if (memcmp(kept.pixels, done.pixels, (size_t)W * H * kept.channels * sizeof(float)) != 0) fail_msg("%s differs after %s", images[k], changes[c][0]);
+            /* without virtual point lights nothing is found of what their bound takes */
+            if (!strcmp(images[k], "compensation") && (!strncmp(changes[c][0], "gi=", 3) || (changes[c][1] && !strcmp(changes[c][1], "bounces=0"))))
+                for (int p = 0; p < W * H * 3; p++) assert_true(done.pixels[p] == 0);
+            es_image_destroy(w.context, &kept);
+            es_image_destroy(w.context, &done);
+        }
+    }
+    for (int i = 0; i < 2; i++) es_renderer_destroy(renderers[i]);
+    small_world_destroy(&w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {unit_test_without_races(test_sets), unit_test_without_races(test_planes), unit_test_without_races(test_corner), unit_test_without_races(test_beyond), unit_test_without_races(test_layers), unit_test_without_races(test_repair),
-        unit_test_without_races(test_bounce), cmocka_unit_test(test_bits)};
+        unit_test_without_races(test_bounce), cmocka_unit_test(test_bits),
+        unit_test_without_races(test_changes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

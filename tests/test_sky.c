@@ -171,6 +171,16 @@ static void test_world_of_sky(void** state)
     assert_false(es_world_get_sky(w.world, &got));
     assert_int_equal(es_world_restore(w.world, saved, size), ES_WRONG_STATE);
     free(saved);
+
+    /* wherever north is, the state is one that can be restored */
+    sky.north = 1000;
+    sky.seconds = 18 * 3600;
+    assert_int_equal(es_world_set_sky(w.world, &sky), ES_OK);
+    assert_int_equal(es_world_save(w.world, NULL, &size), ES_OK);
+    saved = malloc(size);
+    assert_int_equal(es_world_save(w.world, saved, &size), ES_OK);
+    assert_int_equal(es_world_restore(w.world, saved, size), ES_OK);
+    free(saved);
     small_world_destroy(&w);
 }
 
