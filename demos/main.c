@@ -23,7 +23,7 @@ static const char usage[] =
     "             --environment FILE                    light from all around, an EXR or HDR picture in lat-long; for --replay too\n"
     "             --environment-rotation RADIANS --environment-intensity X    turned about y, times X\n"
     "             --replay FILE                         does it again; exit 1 and the first step and object that differ\n"
-    "  earthshine reference SCENE|FILE --out FILE.exr   the truth by path tracing; any image format, .exr with all layers\n"
+    "  earthshine reference SCENE|FILE --out FILE.exr   the truth by path tracing; .exr with all layers, .hdr, .png exposed as the scene is shown\n"
     "             --spp N --seconds S --error E         when to stop: samples per pixel, time, relRMSE by its own\n"
     "                                                   estimate; whichever comes first (256 samples when none is given)\n"
     "             --bounces N                           indirect bounces (1)\n"

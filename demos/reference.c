@@ -47,11 +47,26 @@ static int add_samples(es_context* context, es_reference* reference, uint32_t fr
     return DEMO_OK;
 }
 
-/* The file that can be resumed holds all images; a named one is written alone. */
-static bool can_be_resumed(const demo_options* options, const char* path)
+static bool ends_with(const char* path, const char* ending)
 {
     size_t length = strlen(path);
-    return length > 4 && !strcmp(path + length - 4, ".exr") && !options->image_count;
+    return length > strlen(ending) && !strcmp(path + length - strlen(ending), ending);
+}
+
+/* The file that can be resumed holds all images; a named one is written alone. */
+static bool can_be_resumed(const demo_options* options, const char* path) { return ends_with(path, ".exr") && !options->image_count; }
+
+/* A PNG is to be looked at: light is exposed as the scene is shown with. What is not light, the errors, is as it is. */
+static int expose(const demo_options* options, es_context* context, const char* name, es_image* image)
+{
+    es_world_settings world = es_default_world_settings();
+    es_renderer_settings shown = es_default_renderer_settings();
+    const size_t length = strlen(name);
+    if (length > 6 && !strcmp(name + length - 6, "-error")) return DEMO_OK;
+    if (demo_apply_scene_settings(context, options->scene, &world, &shown, NULL) != DEMO_OK) return DEMO_BAD_INPUT;
+    const float scale = exp2f(shown.exposure);
+    for (size_t i = 0; i < (size_t)image->width * image->height * image->channels; i++) image->pixels[i] *= scale;
+    return DEMO_OK;
 }
 
 static int write_image(const demo_options* options, es_context* context, es_reference* reference, uint32_t frame, const char* name)
@@ -66,7 +81,8 @@ static int write_image(const demo_options* options, es_context* context, es_refe
     int code = DEMO_OK;
     if (options->hash) printf("frame %u %s %016" PRIx64 "\n", frame, name, es_image_hash(&image));
     es_image_save_desc desc = demo_save_desc();
-    if (options->out && !all && es_image_save(context, &image, path, &desc) != ES_OK) code = demo_refuse_context(context);
+    if (options->out && ends_with(path, ".png")) code = expose(options, context, name, &image);
+    if (code == DEMO_OK && options->out && !all && es_image_save(context, &image, path, &desc) != ES_OK) code = demo_refuse_context(context);
     es_image_destroy(context, &image);
     return code;
 }
