@@ -10,12 +10,12 @@
 /* Bits of the sign where a lane's direction is to be turned. */
 VINL vf turned(vf a, vi sign) { return vf_from_bits(vi_from_bits(a) ^ sign); }
 
-/* By one layer of one view, or by all. */
-VINL vf blocked_at(const es_occlusion_job* job, const es_screen_pixel_v* pixels, uint32_t record, uint32_t column, vi sign, vf inverse_radius2, bool simple)
+/* By one layer of one view, by all of its layers, or by all. */
+VINL vf blocked_at(const es_occlusion_job* job, const es_screen_pixel_v* pixels, uint32_t record, uint32_t column, vi sign, vf inverse_radius2, bool simple, bool single)
 {
     vf most = vf_zero();
     vm free = vi_zero();
-    const uint32_t views = simple ? 1 : job->stack->view_count;
+    const uint32_t views = single ? 1 : job->stack->view_count;
     for (uint32_t v = 0; v < views; v++) {
         const es_sample_offset* o = &job->offsets[v][record];
         const vf offset[3] = {turned(vf_load(o->window[0] + column), sign), turned(vf_load(o->window[1] + column), sign), turned(vf_load(o->window[2] + column), sign)};
@@ -27,8 +27,8 @@ VINL vf blocked_at(const es_occlusion_job* job, const es_screen_pixel_v* pixels,
     return views == 1 ? most : vf_and(~free, most);
 }
 
-/* The three switches are constants at every call. */
-VINL void occlude_row(const es_occlusion_job* job, const es_screen_block* block, uint32_t y, bool simple, bool directional)
+/* The three switches are constants at every call. `single`: one view; `simple`: of one layer. */
+VINL void occlude_row(const es_occlusion_job* job, const es_screen_block* block, uint32_t y, bool simple, bool single, bool directional)
 {
     const es_screen_view* view = &job->stack->views[0];
     const es_gbuffer* g = view->layers[0];
@@ -50,7 +50,7 @@ VINL void occlude_row(const es_occlusion_job* job, const es_screen_block* block,
         if (!vm_all(vi_eq(shading, geometric))) es_unpack_normal_v(geometric, &t[0], &t[1], &t[2]);
         es_screen_pixel_v pixels[ES_SCREEN_MAX_VIEWS];
         pixels[0] = es_screen_pixel_of_v(view, fx, fy, d, t);
-        for (uint32_t v = 1; v < job->stack->view_count && !simple; v++) {
+        for (uint32_t v = 1; !single && v < job->stack->view_count; v++) {
             const es_screen_view* other = &job->stack->views[v];
             vf p[3], base[3], dir[3];
             for (int k = 0; k < 3; k++) {
@@ -66,7 +66,7 @@ VINL void occlude_row(const es_occlusion_job* job, const es_screen_block* block,
             const es_occlusion_sample* s = &job->table[first + i];
             const vf cosine = n[0] * vf_load(s->direction[0] + column) + n[1] * vf_load(s->direction[1] + column) + n[2] * vf_load(s->direction[2] + column);
             const vi sign = vi_from_bits(cosine) & vi_set1(INT32_MIN);
-            const vf c = vf_abs(cosine), blocked = blocked_at(job, pixels, first + i, column, sign, inverse_radius2, simple);
+            const vf c = vf_abs(cosine), blocked = blocked_at(job, pixels, first + i, column, sign, inverse_radius2, simple, single);
             const bool any = vm_any(vm_gt(blocked, zero));
             if (!directional) {
                 all[0] = all[0] + c;
@@ -90,10 +90,11 @@ VINL void occlude_row(const es_occlusion_job* job, const es_screen_block* block,
 
 void ES_KERNEL(es_gi_screen_occlusion)(const es_occlusion_job* job, const es_screen_block* block)
 {
-    const bool simple = job->stack->view_count == 1 && job->stack->views[0].layer_count == 1;
+    const bool single = job->stack->view_count == 1, simple = single && job->stack->views[0].layer_count == 1;
     for (uint32_t y = block->y0; y < block->y1; y++) {
-        if (simple && job->directional) occlude_row(job, block, y, true, true);
-        else if (simple) occlude_row(job, block, y, true, false);
-        else occlude_row(job, block, y, false, job->directional);
+        if (simple && job->directional) occlude_row(job, block, y, true, true, true);
+        else if (simple) occlude_row(job, block, y, true, true, false);
+        else if (single) occlude_row(job, block, y, false, true, job->directional);
+        else occlude_row(job, block, y, false, false, job->directional);
     }
 }

@@ -110,12 +110,15 @@ VINL vf es_screen_blocked_v(const es_screen_view* view, const es_screen_pixel_v*
             /* of the sides by which the line of sight enters and leaves, the nearer counts; one that is nowhere is far away */
             const vf end = vf_gather(view->layers[layer + 1]->depth, at.at);
             const vm ends = vm_gt(end, zero), passed = ends & vm_le(end, at.depth);
-            const vf other = es_screen_distance2_v(view, p, &at, vf_min(end, at.depth + at.depth), &rise);
-            distance2 = vf_select(ends, vf_min(distance2, other), distance2);
             within = behind & ~passed;
             behind = behind & passed;
+            if (vm_any(within & rises & ends)) {
+                const vf other = es_screen_distance2_v(view, p, &at, vf_min(end, at.depth + at.depth), &rise);
+                distance2 = vf_select(ends, vf_min(distance2, other), distance2);
+            }
         }
         hidden = hidden | within;
+        if (!first && !vm_any(within & rises)) continue;
         blocked = vf_max(blocked, vf_and(within & rises, es_screen_fade_v(distance2, inverse_radius2)));
     }
     *free = at.inside & ~hidden;
