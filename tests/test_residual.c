@@ -213,24 +213,40 @@ static double mean(const es_image* image)
     return sum / ((double)image->width * image->height * image->channels);
 }
 
+/* A coarse Cornell box, and settings that bound its light well within it. */
+typedef struct bounded_box { es_context* context; es_world* world; es_renderer_settings settings; } bounded_box;
+
+static bounded_box open_box(uint32_t steps)
+{
+    bounded_box b = {.settings = es_default_renderer_settings()};
+    es_world_settings coarse = es_default_world_settings();
+    coarse.triangles = 2000;
+    assert_int_equal(es_context_create(NULL, &b.context), ES_OK);
+    assert_int_equal(es_world_create_scene(b.context, "cornell", &coarse, &b.world), ES_OK);
+    b.settings.width = 96;
+    b.settings.height = 72;
+    b.settings.vpls = 64;
+    b.settings.ism_points = 256;
+    b.settings.geometry_bound = 200;
+    b.settings.compensation_steps = steps;
+    return b;
+}
+
+static void close_box(const bounded_box* b)
+{
+    es_world_destroy(b->world);
+    es_context_destroy(b->context);
+}
+
 /* Every part of the light is an image, and they add up to the picture in the order that gi/compose.h says, to the bit. */
 static void test_parts_add_up(void** state)
 {
     (void)state;
-    es_context* context;
-    es_world* world;
+    const bounded_box box = open_box(3);
+    es_context* context = box.context;
+    es_world* world = box.world;
     es_renderer* renderer;
-    assert_int_equal(es_context_create(NULL, &context), ES_OK);
-    es_world_settings coarse = es_default_world_settings();
-    coarse.triangles = 2000;
-    assert_int_equal(es_world_create_scene(context, "cornell", &coarse, &world), ES_OK);
-    es_renderer_settings settings = es_default_renderer_settings();
-    settings.width = 96;
-    settings.height = 72;
-    settings.vpls = 64;
-    settings.ism_points = 256;
-    settings.geometry_bound = 200;
-    settings.compensation_steps = 3;
+    es_renderer_settings settings = box.settings;
     assert_int_equal(es_renderer_create(context, &settings, &renderer), ES_OK);
     assert_int_equal(es_renderer_render(renderer, world), ES_OK);
     static const char* const names[] = {"radiance", "emission", "direct", "indirect", "indirect-bounded", "compensation-1", "compensation-2", "compensation-3", "compensation-4"};
@@ -275,8 +291,7 @@ static void test_parts_add_up(void** state)
     }
     es_renderer_destroy(again);
     es_renderer_destroy(renderer);
-    es_world_destroy(world);
-    es_context_destroy(context);
+    close_box(&box);
 }
 
 /* With one bounce, what is found is of it alone: direct light is sent, whose every patch is known, and other virtual point lights change nothing. With two,
@@ -284,34 +299,24 @@ static void test_parts_add_up(void** state)
 static void test_of_one_bounce(void** state)
 {
     (void)state;
-    es_context* context;
-    es_world* world;
+    const bounded_box box = open_box(1);
+    es_context* context = box.context;
     es_renderer* renderer;
-    assert_int_equal(es_context_create(NULL, &context), ES_OK);
-    es_world_settings coarse = es_default_world_settings();
-    coarse.triangles = 2000;
-    assert_int_equal(es_world_create_scene(context, "cornell", &coarse, &world), ES_OK);
-    es_renderer_settings settings = es_default_renderer_settings();
-    settings.width = 96;
-    settings.height = 72;
-    settings.ism_points = 256;
-    settings.geometry_bound = 200;
-    settings.compensation_steps = 1;
+    es_renderer_settings settings = box.settings;
     es_image found[3];
     for (uint32_t i = 0; i < 3; i++) {
         settings.vpls = i == 1 ? 96 : 64;
         settings.bounces = i == 2 ? 2 : 1;
         if (i) assert_int_equal(es_renderer_configure(renderer, &settings), ES_OK);
         else assert_int_equal(es_renderer_create(context, &settings, &renderer), ES_OK);
-        assert_int_equal(es_renderer_render(renderer, world), ES_OK);
+        assert_int_equal(es_renderer_render(renderer, box.world), ES_OK);
         found[i] = picture(renderer, "compensation-1");
     }
     assert_memory_equal(found[0].pixels, found[1].pixels, (size_t)settings.width * settings.height * 3 * sizeof(float));
     assert_true(mean(&found[0]) > 0 && mean(&found[2]) > 1.02 * mean(&found[0]));
     for (uint32_t i = 0; i < 3; i++) es_image_destroy(context, &found[i]);
     es_renderer_destroy(renderer);
-    es_world_destroy(world);
-    es_context_destroy(context);
+    close_box(&box);
 }
 
 int main(void)

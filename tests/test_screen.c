@@ -290,6 +290,29 @@ static void test_bounce(void** state)
 
 /* ---- bits ---------------------------------------------------------------------------------------------------------------------------- */
 
+/* Small pictures with few lights; the second of a pair of renderers does everything again in every frame. */
+static es_renderer_settings small_settings(uint32_t width, uint32_t height, int of_pair)
+{
+    es_renderer_settings s = es_default_renderer_settings();
+    s.width = width;
+    s.height = height;
+    s.vpls = 64;
+    s.ism_pool = 16384;
+    s.ism_points = 512;
+    s.light_size = 64;
+    s.skip = of_pair == 0;
+    return s;
+}
+
+/* Light of a lamp and of the sky. */
+static void light_up(small_world* w)
+{
+    es_light_desc lamp = es_default_light_desc();
+    lamp.intensity = 30;
+    add_light(w, lamp, es_v3(1, 2, 1.5f), es_v3(-1, -2, -1.5f));
+    assert_int_equal(es_world_set_environment(w->world, &(es_environment_desc){.radiance = {0.5f, 0.7f, 1}}), ES_OK);
+}
+
 /* All of it at once, in worlds that have nothing, one pixel, little or much. */
 static void test_bits(void** state)
 {
@@ -306,7 +329,6 @@ static void test_bits(void** state)
             small_world w = {.context = context};
             assert_int_equal(es_world_create(context, NULL, &w.world), ES_OK);
             es_material_desc grey = lambert(0.6f, 0), metal = es_default_material_desc();
-            es_light_desc lamp = es_default_light_desc();
             metal.metallic = 1;
             metal.roughness = 0.3f;
             if (kind == 1) add_block(&w, es_v3(0, 0, 0), es_v3(0.004f, 0.004f, 0.004f), &metal);
@@ -315,20 +337,11 @@ static void test_bits(void** state)
                 add_block(&w, es_v3(-0.5f, 0, -0.5f), es_v3(0.1f, 0.7f, 0.4f), &grey);
                 add_sphere(&w, es_v3(0.6f, 0.3f, 0.2f), 0.3f, 8, false, &metal);
             }
-            lamp.intensity = 30;
-            add_light(&w, lamp, es_v3(1, 2, 1.5f), es_v3(-1, -2, -1.5f));
-            assert_int_equal(es_world_set_environment(w.world, &(es_environment_desc){.radiance = {0.5f, 0.7f, 1}}), ES_OK);
+            light_up(&w);
             look(&w, eye(0.8f), kind == 3 ? es_v3(0.3f, 0.001f, 1) : es_v3(0.4f, 1, 3), es_v3(0, 0.001f, 0));
             es_renderer* renderers[2];
             for (int i = 0; i < 2; i++) {
-                es_renderer_settings s = es_default_renderer_settings();
-                s.width = W;
-                s.height = H;
-                s.vpls = 64;
-                s.ism_pool = 16384;
-                s.ism_points = 512;
-                s.light_size = 64;
-                s.skip = !i;
+                es_renderer_settings s = small_settings(W, H, i);
                 s.lamps = ES_LAMPS_SCREEN;
                 s.screen_layers = kind == 3 ? 4 : 2;
                 s.screen_cameras = 2;
@@ -374,23 +387,13 @@ static void test_changes(void** state)
     static const char* const images[] = {"direct", "lamps", "indirect", "occlusion", "compensation", "radiance"};
     small_world w = small_world_create();
     const es_material_desc grey = lambert(0.6f, 0);
-    es_light_desc lamp = es_default_light_desc();
     add_floor(&w, 2, &grey);
     for (int i = 0; i < 4; i++) add_block(&w, es_v3(-0.5f + 0.25f * (float)i, 0, -0.5f + 0.2f * (float)i), es_v3(0.05f, 0.3f, 0.05f), &grey);
-    lamp.intensity = 30;
-    add_light(&w, lamp, es_v3(1, 2, 1.5f), es_v3(-1, -2, -1.5f));
-    assert_int_equal(es_world_set_environment(w.world, &(es_environment_desc){.radiance = {0.5f, 0.7f, 1}}), ES_OK);
+    light_up(&w);
     look(&w, eye(0.8f), es_v3(0.2f, 0.5f, 1.5f), es_v3(0, 0.1f, 0));
     es_renderer* renderers[2];
     for (int i = 0; i < 2; i++) {
-        es_renderer_settings s = es_default_renderer_settings();
-        s.width = W;
-        s.height = H;
-        s.vpls = 64;
-        s.ism_pool = 16384;
-        s.ism_points = 512;
-        s.light_size = 64;
-        s.skip = !i;
+        es_renderer_settings s = small_settings(W, H, i);
         assert_int_equal(es_renderer_create(w.context, &s, &renderers[i]), ES_OK);
     }
     for (size_t c = 0; c < sizeof changes / sizeof changes[0]; c++) {

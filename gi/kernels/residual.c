@@ -260,7 +260,6 @@ static void gather_layer(const es_residual_job* job, const es_residual_layer* la
         }
 }
 
-
 /* What pixels of a row are as receivers; false when none is one. */
 static bool read_receivers(const es_residual_job* job, vi columns, uint32_t row, vm inside, receivers* r)
 {
