@@ -8,6 +8,7 @@
 #include "gi/bounces.h"
 #include "gi/compose.h"
 #include "gi/direct.h"
+#include "gi/edit/edit.h"
 #include "gi/environment.h"
 #include "gi/error/flip.h"
 #include "gi/filter.h"
@@ -36,6 +37,8 @@
     X(view_importance, (const es_receivers* receivers, const es_sender* senders, uint32_t count, float* result)) \
     /* rows [row_begin, row_end) */                                                                              \
     X(direct, (const es_direct_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    /* gi/edit/edit.h: rows */                                                                                   \
+    X(edit_directions, (const es_edit_job* job, uint32_t row_begin, uint32_t row_end))                          \
     /* gi/screen/residual.h: rows of the level, of the result */                                                 \
     X(residual_level, (const es_residual_layer* layer, uint32_t level, uint32_t row_begin, uint32_t row_end))    \
     X(residual_gather, (const es_residual_job* job, uint32_t row_begin, uint32_t row_end))                       \
