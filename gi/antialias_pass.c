@@ -36,7 +36,7 @@ static es_result resolve(es_renderer* r, uint32_t picture)
         compose.finished[k] = NULL;
         compose.radiance[k] = h->fresh.at[k];
     }
-    es_antialias_job job = {.gbuffer = &r->gbuffer, .compose = &compose, .moving = h->moving, .clamp = over_frames && h->still < ES_ANTIALIAS_STILL, .exposure_scale = compose.exposure_scale};
+    es_antialias_job job = {.gbuffer = &r->gbuffer, .compose = &compose, .moving = h->moving, .clamp = over_frames && h->still < ES_ANTIALIAS_STILL, .exposure_scale = es_exp2(s->exposure)};
     job.blend = over_frames ? 1.0f / (1.0f / s->antialias_blend + (float)h->still) : 1.0f / (1.0f + (float)picture);
     const bool goes_on = over_frames ? h->continuous && h->has_picture : picture > 0;
     for (int k = 0; k < 3; k++) {

@@ -157,6 +157,9 @@ typedef struct es_renderer_settings {
     uint32_t tone_map;               /* es_tone_map */
     float exposure;                  /* stops */
     float white;                     /* REINHARD: radiance times exposure that is shown as white */
+    float exposure_adapt;            /* s that the exposure takes to get used to a brighter picture, four times that to a darker one (gi/exposure.h); the first picture is what it is
+                                      * used to. Goes by the world's time. 0: the exposure is what `exposure` says, otherwise that is added to it */
+    float exposure_key;              /* exposure_adapt: radiance times exposure that the picture's logarithmic mean is shown as */
     /* several bounces */
     uint32_t bounces;                /* 0: none; 1: one indirect bounce; … ES_MAX_BOUNCES */
     uint32_t bounce_method;          /* es_bounce_method */

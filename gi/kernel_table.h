@@ -14,6 +14,7 @@
 #include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/half_resolution.h"
+#include "gi/meter.h"
 #include "gi/micro/forest_parts.h"
 #include "gi/micro/gather.h"
 #include "gi/micro/light.h"
@@ -46,6 +47,7 @@
     X(open_shade, (const es_open_job* job, uint32_t row_begin, uint32_t row_end))                                \
     X(open_upsample, (const es_open_upsample_job* job, uint32_t row_begin, uint32_t row_end))                    \
     X(compose, (const es_compose_job* job, uint32_t row_begin, uint32_t row_end))                                  \
+    X(meter, (const es_meter_job* job, uint32_t row_begin, uint32_t row_end))                                      \
     X(blend, (const es_blend_job* job, uint32_t row_begin, uint32_t row_end))                                    \
     X(light_points, (const es_point_light_job* job, const es_point_forest* forest, const es_leaf_range* range))  \
     X(push_points, (const es_point_push* push, const es_point_forest* forest, const es_push_range* range)) \

@@ -43,6 +43,8 @@
     X(BLEND_LAYERS, "blended layers", "triangles")                                                               \
     X(BLEND_LIGHT, "light of blended layers", "pixels")                                                          \
     X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \
+    X(RADIANCE, "radiance of the picture", "pixels")                                                             \
+    X(METER, "light meter", "pixels")                                                                            \
     X(COMPOSE, "compose", "pixels")
 
 typedef enum es_pass {

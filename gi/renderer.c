@@ -108,6 +108,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->upsampled_specular);
     es_planes_free(context, &renderer->background);
     es_planes_free(context, &renderer->direct);
+    es_planes_free(context, &renderer->radiance);
     es_planes_free(context, &renderer->irradiance);
     es_planes_free(context, &renderer->specular);
     es_planes_free(context, &renderer->compensation);
@@ -494,10 +495,13 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
     return ES_OK;
 }
 
+/* What getting used to the picture makes of the exposure. */
+static float exposure_adapted(const es_renderer* r) { return r->exposure.grid.started ? es_exposure_scale(&r->exposure, r->settings.exposure_key) : 1.0f; }
+
 es_compose_job es_renderer_compose_job(const es_renderer* r)
 {
     const es_renderer_settings* s = &r->settings;
-    es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure), .white = s->white, .tone_map = s->tone_map};
+    es_compose_job job = {.gbuffer = &r->gbuffer, .exposure_scale = es_exp2(s->exposure) * exposure_adapted(r), .white = s->white, .tone_map = s->tone_map};
     const es_planes* irradiance = es_indirect_irradiance(r);
     const es_planes* specular = es_indirect_specular(r);
     job.lit = specular->lit;
@@ -513,16 +517,15 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
         if (r->plan.valid[ES_PASS_SCREEN_BOUNCE]) job.further[ES_FURTHER_BOUNCE][k] = r->screen.bounce.at[k];
         if (r->plan.valid[ES_PASS_SECOND_ORDER]) job.further[ES_FURTHER_NEGATIVE][k] = r->second_order.negative.at[k];
         for (uint32_t i = 0; i < es_residual_steps(r); i++) job.further[ES_FURTHER_RESIDUAL + i][k] = r->residual.steps[i].at[k];
+        if (r->plan.valid[ES_PASS_RADIANCE]) job.finished[k] = r->radiance.at[k];
         if (r->plan.valid[ES_PASS_ANTIALIAS]) job.finished[k] = r->history.picture[r->history.current_picture].at[k];
     }
     return job;
 }
 
-static void pass_compose(es_renderer* r)
+/* What a picture's radiance is made of. */
+static void reads_picture(es_plan* plan, const es_compose_job* job)
 {
-    es_plan* plan = &r->plan;
-    es_compose_job job = es_renderer_compose_job(r);
-    es_plan_begin(plan, ES_PASS_COMPOSE);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_BACKGROUND);
     es_plan_reads_pass(plan, ES_PASS_DIRECT);
@@ -538,7 +541,66 @@ static void pass_compose(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_SECOND_ORDER);
     es_plan_reads_pass(plan, ES_PASS_BLEND_LIGHT);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
-    float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.direct[0] != NULL, job.irradiance[0] != NULL, job.specular[0] != NULL, job.lamp_irradiance[0] != NULL, job.lamp_specular[0] != NULL};
+    const uint32_t parts[] = {job->direct[0] != NULL, job->irradiance[0] != NULL, job->specular[0] != NULL, job->lamp_irradiance[0] != NULL, job->lamp_specular[0] != NULL};
+    es_plan_reads(plan, parts, sizeof parts);
+}
+
+/* Does something look at the whole picture before it is shown? */
+static bool wants_radiance(const es_renderer* r) { return r->settings.exposure_adapt > 0; }
+
+static es_result pass_radiance(es_renderer* r)
+{
+    es_plan* plan = &r->plan;
+    if (!wants_radiance(r) || r->settings.antialias != ES_ANTIALIAS_NONE) {
+        es_plan_not_needed(plan, ES_PASS_RADIANCE, wants_radiance(r) ? "anti-aliasing has made it" : "nothing reads it");
+        es_planes_free(r->context, &r->radiance);
+        return ES_OK;
+    }
+    es_compose_job job = es_renderer_compose_job(r);
+    es_plan_begin(plan, ES_PASS_RADIANCE);
+    reads_picture(plan, &job);
+    if (!es_plan_run(plan, ES_PASS_RADIANCE)) return ES_OK;
+    es_result result = es_planes_resize(r->context, &r->radiance, &r->gbuffer);
+    if (result) return result;
+    for (int k = 0; k < 3; k++) {
+        job.finished[k] = NULL;
+        job.radiance[k] = r->radiance.at[k];
+    }
+    es_compose(r->context, &job);
+    es_plan_done(plan, ES_PASS_RADIANCE, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+    return ES_OK;
+}
+
+static es_result pass_meter(es_renderer* r, const es_frame_inputs* in)
+{
+    es_plan* plan = &r->plan;
+    const es_renderer_settings* s = &r->settings;
+    if (!wants_radiance(r)) {
+        es_plan_not_needed(plan, ES_PASS_METER, "nothing reads it");
+        r->exposure = (es_exposure){0};
+        return ES_OK;
+    }
+    es_plan_begin(plan, ES_PASS_METER);
+    es_plan_reads_pass(plan, ES_PASS_RADIANCE);
+    es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
+    if (es_plan_run(plan, ES_PASS_METER)) {
+        const es_compose_job job = es_renderer_compose_job(r);
+        es_result result = es_meter_read(r->context, job.finished, r->gbuffer.width, r->gbuffer.height, r->gbuffer.stride, &r->metered);
+        if (result) return result;
+        es_plan_done(plan, ES_PASS_METER, (uint64_t)r->gbuffer.width * r->gbuffer.height);
+    }
+    if (s->exposure_adapt > 0) es_exposure_advance(&r->exposure, s->exposure_adapt, in->time, r->metered.log_average);
+    else r->exposure = (es_exposure){0};
+    return ES_OK;
+}
+
+static void pass_compose(es_renderer* r)
+{
+    es_plan* plan = &r->plan;
+    es_compose_job job = es_renderer_compose_job(r);
+    es_plan_begin(plan, ES_PASS_COMPOSE);
+    reads_picture(plan, &job);
+    const float numbers[] = {job.exposure_scale, job.white, (float)job.tone_map, job.finished[0] != NULL};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (!es_plan_run(plan, ES_PASS_COMPOSE)) return;
     job.xrgb = r->display;
@@ -614,6 +676,7 @@ static es_result render(es_renderer* r, es_world* world)
     size_t light_count;
     in.lights = es_world_lights(world, &light_count);
     in.light_count = (uint32_t)light_count;
+    in.time = es_world_time(world);
     in.has_environment = es_world_get_environment(world, &in.environment);
     in.has_geometry = es_world_bounds(world, &in.bounds_min, &in.bounds_max);
     in.extent = in.has_geometry ? es_maxf(es_v3_length(es_v3_sub(in.bounds_max, in.bounds_min)), 1e-9f) : 1.0f;
@@ -630,6 +693,8 @@ static es_result render(es_renderer* r, es_world* world)
         for (int i = 0; i < ES_PASS_COUNT; i++) r->plan.stats[i].skipped = "the picture has settled";
     const uint32_t pictures = stands ? 0 : es_antialias_pictures(s);
     for (uint32_t i = 0; i < pictures && !result; i++) result = draw_picture(r, &in, world, i);
+    if (!result) result = pass_radiance(r);
+    if (!result) result = pass_meter(r, &in);
     if (!result) pass_compose(r);
     if (!result) es_history_end(&r->history);
     return result;

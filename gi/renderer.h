@@ -5,6 +5,7 @@
 #include "gi/blend_lists.h"
 #include "gi/compose.h"
 #include "gi/environment.h"
+#include "gi/exposure.h"
 #include "gi/filter.h"
 #include "gi/half_resolution.h"
 #include "gi/history.h"
@@ -12,6 +13,7 @@
 #include "gi/lamps.h"
 #include "gi/layer_light.h"
 #include "gi/light_view.h"
+#include "gi/meter.h"
 #include "gi/micro/light.h"
 #include "gi/micro/micro.h"
 #include "gi/plan.h"
@@ -119,6 +121,9 @@ struct es_renderer {
     bool has_specular;
     uint32_t filter_passes;    /* that this frame's indirect light went through */
     es_history history;
+    es_planes radiance;        /* of the picture, where something reads it before it is shown and anti-aliasing has not made it */
+    es_meter metered;          /* valid when the pass is */
+    es_exposure exposure;
     es_arena arena;            /* of the pass that runs */
     uint32_t* display;         /* 0x00RRGGBB */
     es_srgb_table srgb;
@@ -132,6 +137,7 @@ typedef struct es_frame_inputs {
     es_world_revisions revisions;
     es_environment_desc environment;
     bool has_environment;
+    double time;             /* es_world_time, s */
     es_vec3 bounds_min, bounds_max;
     float extent;            /* diagonal of the world's bounds, metres */
     bool has_geometry;

@@ -128,6 +128,8 @@ static const es_setting renderer_table[] = {
     {"tone-map", ES_SETTING_CHOICE, "reinhard", 0, 0, "reinhard|pbr-neutral|linear", "display transform", AT(tone_map)},
     {"white", ES_SETTING_FLOAT, "4", 0.01, 100000, NULL, "Reinhard: radiance times exposure that is shown as white", AT(white)},
     {"exposure", ES_SETTING_FLOAT, "0", -20, 20, NULL, "stops", AT(exposure)},
+    {"exposure.adapt", ES_SETTING_FLOAT, "0", 0, 1000, NULL, "seconds in which the exposure gets used to a brighter picture, four times as many to a darker one; 0: it does not", AT(exposure_adapt)},
+    {"exposure.key", ES_SETTING_FLOAT, "0.18", 0.001, 100, NULL, "exposure.adapt: radiance times exposure that the picture's logarithmic mean gets, before stops", AT(exposure_key)},
 };
 
 size_t es_renderer_setting_count(void) { return sizeof renderer_table / sizeof renderer_table[0]; }

@@ -11,7 +11,7 @@
 
 uint64_t es_history_settings(const es_renderer_settings* settings)
 {
-    static const char* const others[] = {"skip", "exposure", "white", "tone-map"};
+    static const char* const others[] = {"skip", "exposure", "exposure.adapt", "exposure.key", "white", "tone-map"};
     uint64_t hash = 0;
     for (size_t i = 0; i < es_renderer_setting_count(); i++) {
         const es_setting* setting = es_renderer_setting(i);
