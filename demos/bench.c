@@ -52,6 +52,7 @@ static const benchmark benchmarks[] = {
     {"scenes", bench_scenes, bench_scenes_rows, false},
     {"time", bench_time, bench_time_rows, false},
     {"rays", bench_rays, bench_rays_rows, false},
+    {"fft", bench_fft, bench_fft_rows, false},
     {"dynamics", bench_dynamics, bench_dynamics_rows, false},
 };
 enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0], MAX_ROWS = 384 };

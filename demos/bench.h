@@ -103,7 +103,8 @@ typedef enum bench_peer_kind {
     BENCH_LLVMPIPE,    /* its programs for drawing, shading and starting */
     BENCH_EMBREE_RAYS, /* building and tracing rays: rows as "primary intersect1 70k" */
     BENCH_EMBREE_PATHS, /* one diffuse bounce by path tracing, demos/bench_embree_paths.c */
-    BENCH_BULLET        /* rigid bodies; cloth */
+    BENCH_BULLET,       /* rigid bodies; cloth */
+    BENCH_FFT           /* FFTW and KissFFT: takes the threads alone */
 } bench_peer_kind;
 typedef struct bench_peer {
     bench_peer_kind kind;
@@ -129,6 +130,10 @@ bool bench_peer_run_program(bench_peer* peer, size_t program, const char* const*
 /* bench_rays.c */
 int bench_rays(const bench_options* options);
 size_t bench_rays_rows(bench_row* rows, size_t capacity);
+
+/* bench_fft.c */
+int bench_fft(const bench_options* options);
+size_t bench_fft_rows(bench_row* rows, size_t capacity);
 
 /* bench_speed.c, bench_speed_errors.c */
 int bench_speed(const bench_options* options);

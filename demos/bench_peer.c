@@ -33,6 +33,7 @@ static const peer_kind kinds[] = {
         {"-lembree3", "-lpthread", "-lm"}, NULL, NULL},
     [BENCH_BULLET] = {"Bullet", "rigid", "bullet_peer.cpp", {{"bullet_peer", "bullet_peer.cpp", false}, {"bullet_cloth", "bullet_cloth.cpp", false}},
         {"-O2", "-I/usr/include/bullet"}, {"-lBulletSoftBody", "-lBulletDynamics", "-lBulletCollision", "-lLinearMath", "-lstdc++", "-lm"}, NULL, NULL},
+    [BENCH_FFT] = {"FFTW's and KissFFT", "fft", "fft_peer.c", {{"fft_peer", "fft_peer.c", false}}, {"-O2"}, {"-lfftw3f_threads", "-lfftw3f", "-lkissfft-float", "-lpthread", "-lm"}, NULL, NULL},
 };
 
 static bool try_folder(bench_peer* peer, const char* shared)

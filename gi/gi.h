@@ -420,6 +420,12 @@ ES_API void es_bvh_any(const es_bvh* bvh, es_ray_kind kind, const es_ray* rays, 
  * coordinate (after Wächter and Binder 2019). So rays need no minimum that would depend on the scene's size. */
 ES_API es_vec3 es_offset_origin(es_vec3 point, es_vec3 geometric_normal);
 
+/* ---- Fourier transforms ---------------------------------------------------------------------------------------------------------------- */
+
+/* Milliseconds of one transform as glare makes them, the median of `times` (1 … 64): of random numbers, complex, or real to half a complex picture.
+ * For benchmarks. INVALID_ARGUMENT for sizes other than products of 2, 3 and 5 up to 16384, of the width multiples of 64. */
+ES_API es_result es_fft_measure(es_context* context, uint32_t width, uint32_t height, bool real, uint32_t times, double* milliseconds);
+
 /* ---- error: how far a picture is from the truth ------------------------------------------------------------------------------------ */
 
 /* Of a picture A against a reference B, over all pixels and the channels compared, with d = A - B. Deterministic: own elementary

@@ -11,6 +11,7 @@
 #include "gi/edit/edit.h"
 #include "gi/environment.h"
 #include "gi/error/flip.h"
+#include "gi/fft.h"
 #include "gi/filter.h"
 #include "gi/gi.h"
 #include "gi/half_resolution.h"
@@ -76,6 +77,9 @@
     X(temporal_blend, (const es_temporal_job* job, uint32_t row_begin, uint32_t row_end))                        \
     /* the tile whose first pixel is (x, y), once it is loaded */                                                \
     X(flip, (const es_flip_job* job, uint32_t x, uint32_t y, const es_flip_scratch* scratch))                    \
+    /* gi/fft.h: strips of columns, rows; scratch of es_fft_column_scratch or es_fft_row_scratch floats, 64-byte aligned */ \
+    X(fft_columns, (const es_fft_columns_job* job, uint32_t begin, uint32_t end, float* scratch))                \
+    X(fft_rows, (const es_fft_rows_job* job, uint32_t begin, uint32_t end, float* scratch))                      \
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
     X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))       \
     X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))                   \
