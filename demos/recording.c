@@ -71,6 +71,8 @@ static const char* kind_name(es_object_kind kind)
     case ES_OBJECT_JOINT: return "joint";
     case ES_OBJECT_SOFT: return "soft body";
     case ES_OBJECT_MOVER: return "mover";
+    case ES_OBJECT_REGION: return "region";
+    case ES_OBJECT_CONSTRAINT: return "constraint";
     default: return "object";
     }
 }

@@ -4,6 +4,7 @@
 
 #include "platform/platform.h"
 #include "sim/deform.h"
+#include "sim/edits/geodesic.h"
 #include "sim/rigid/solver.h"
 #include "sim/soft/soft_kernels.h"
 
@@ -45,7 +46,9 @@
     /* push: linear and angular momentum over h that the particles got are added to it */                        \
     X(soft_contact, (float* positions, const float* previous, const es_soft_surface* surface, uint32_t begin, uint32_t end, float push[6])) \
     /* blocks [begin, end) of eight slots */                                                                     \
-    X(soft_air, (const es_soft_air* job, uint32_t begin, uint32_t end))
+    X(soft_air, (const es_soft_air* job, uint32_t begin, uint32_t end))                                          \
+    /* entries [begin, end) of the job's list */                                                                 \
+    X(geodesic_front, (const es_geodesic_job* job, uint32_t begin, uint32_t end))
 
 struct es_sim_kernels {
 #define ES_SIM_KERNEL_FIELD(name, arguments) void (*name) arguments;

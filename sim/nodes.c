@@ -71,6 +71,7 @@ es_result es_world_destroy_node(es_world* world, es_node node)
     es_world_rereference(world, ES_OBJECT_NODE, object->parent.id, 0);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_NODE], &object->object);
     world->order_dirty = world->nodes_dirty = true;
+    world->pose_changes++;
     return ES_OK;
 }
 
@@ -239,5 +240,6 @@ void es_nodes_refresh(es_world* world)
         if (node->fresh || !world->stepped) es_node_settle(node);
         node->fresh = false;
     }
+    world->pose_changes += any;
     if (any) world->list_dirty = world->lights_dirty = world->camera_dirty = world->nodes_moving = world->poses_dirty = true;
 }

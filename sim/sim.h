@@ -31,6 +31,8 @@ typedef struct es_clip { uint32_t id; } es_clip;
 typedef struct es_mover { uint32_t id; } es_mover;
 typedef struct es_skin { uint32_t id; } es_skin;
 typedef struct es_soft { uint32_t id; } es_soft;
+typedef struct es_region { uint32_t id; } es_region;
+typedef struct es_constraint { uint32_t id; } es_constraint;
 
 /* ---- the world itself ------------------------------------------------------------------------------------------------------------ */
 
@@ -707,6 +709,195 @@ typedef struct es_soft_contact { es_soft soft; uint32_t vertex /* nearest of the
 /* The first triangle of any soft body that a ray from `origin` meets within `max` metres, from either side; soft null: none. */
 ES_API es_result es_world_soft_pick(const es_world* world, const double origin[3], es_vec3 direction, float max, es_soft_contact* contact);
 
+/* ---- reflection edits: what mirrors are to show instead --------------------------------------------------------------------------- */
+
+/* Reflection editing (Ritschel, thesis, chapter 7): a constraint says what is to be seen in a mirror at one place of it, a region where in the scene
+ * that may change anything. Both are data of the world: named, enumerated, part of the saved state and of recordings, in glTF files and undone; what is made
+ * of them is for the light above to say. Other than the rest of the world's objects they are whole in the saved state: restoring one brings back the edits that
+ * there were, under the handles they had.
+ *
+ * They hold on to surfaces without keeping them alive: where an instance or a triangle is gone, an edit has no effect, which es_world_get_constraint_state and
+ * es_world_get_region_state tell with the reason. It takes effect again when what it needs is there again, as after undoing. */
+
+typedef enum es_anchor_kind {
+    ES_ANCHOR_NONE,
+    ES_ANCHOR_POINT,          /* a place of the world, or, with an instance, of its node's axes */
+    ES_ANCHOR_SURFACE         /* a place on a triangle, which it follows wherever node, skin, morph targets or cloth take it */
+} es_anchor_kind;
+typedef struct es_anchor {
+    es_anchor_kind kind;
+    es_instance instance;     /* SURFACE: whose surface; POINT: in whose node's axes, null: the world's */
+    uint32_t triangle;        /* SURFACE: of its mesh … */
+    float u, v;               /* … and where on it: (1 - u - v) · first + u · second + v · third vertex; neither negative, u + v at most 1 */
+    double point[3];          /* POINT: metres */
+} es_anchor;
+
+/* On a triangle; u and v are taken to the nearest that lie on it. INVALID_ARGUMENT when the mesh has no such triangle. */
+ES_API es_result es_world_anchor_of_triangle(const es_world* world, es_instance instance, uint32_t triangle, float u, float v, es_anchor* anchor);
+/* The place of the instance's surface that is nearest to a point of the world. A kind of NONE when it has no surface. The first time for a mesh, and once after each
+ * change of its vertices, that takes some milliseconds per 100 000 triangles; otherwise microseconds. OUT_OF_MEMORY, MEMORY_CAP. */
+ES_API es_result es_world_anchor_of_point(const es_world* world, es_instance instance, const double point[3], es_anchor* anchor);
+/* Where a ray first meets a surface that is not hidden, from either side, within `max` metres; a kind of NONE when it meets none. direction need not be unit. Costs
+ * as the above for each instance whose box it passes. */
+ES_API es_result es_world_anchor_of_ray(const es_world* world, const double origin[3], es_vec3 direction, float max, es_anchor* anchor);
+/* Where it is now, in the world; and the unit normal that the surface has there, from its vertices' (0 of a POINT). Either may be NULL. False, and nothing is
+ * written, for a kind of NONE, and where the instance is gone or has no such triangle. */
+ES_API bool es_world_resolve_anchor(const es_world* world, const es_anchor* anchor, double position[3], es_vec3* normal);
+
+typedef enum es_region_type {
+    ES_REGION_EUCLIDEAN,      /* what lies within `radius` of `centre`, on whatever surface */
+    ES_REGION_GEODESIC,       /* within `radius` over the surface that `centre` is on */
+    ES_REGION_FREE_FORM       /* drawn on one surface: where strokes have been */
+} es_region_type;
+/* A round brush drawn from one place to another of the same instance: what lies within `radius` of the line between them is in the region, or, `erase`, no longer is.
+ * The distance is taken through space: strokes are short. Later ones go over earlier ones. */
+typedef struct es_region_stroke { es_anchor from, to; float radius; bool erase; } es_region_stroke;
+typedef struct es_region_desc {
+    const char* name;
+    es_region_type type;
+    es_anchor centre;         /* GEODESIC: on a surface; not read of FREE_FORM */
+    float radius;             /* metres, 0 … 1e9; not read of FREE_FORM */
+    float border;             /* metres, 0 … 1e9: over which, inwards from the edge, the region fades: 1 - smoothstep(radius - border, radius, distance) */
+    const es_region_stroke* strokes; /* FREE_FORM: copied; anchors on surfaces of one instance */
+    uint32_t stroke_count;    /* up to 4096 */
+    bool off;
+} es_region_desc;
+ES_API es_region_desc es_default_region_desc(void); /* Euclidean, radius 0.5, border 0.2, without a centre */
+/* INVALID_ARGUMENT when a number is not finite or outside its range. Anchors on what does not exist are accepted: the region has no effect. */
+ES_API es_result es_world_add_region(es_world* world, const es_region_desc* desc, es_region* region);
+/* The name stays. */
+ES_API es_result es_world_set_region(es_world* world, es_region region, const es_region_desc* desc);
+/* name and strokes belong to the world and are valid until the region is changed. */
+ES_API es_result es_world_get_region(const es_world* world, es_region region, es_region_desc* desc);
+ES_API es_result es_world_destroy_region(es_world* world, es_region region);
+
+/* What the keys of a constraint go by. */
+typedef enum es_edit_parameter_kind {
+    ES_EDIT_TIME,             /* the world's, seconds */
+    ES_EDIT_CAMERA,           /* a coordinate of a camera's place; null: of the active one */
+    ES_EDIT_NODE,             /* of a node's */
+    ES_EDIT_LIGHT,            /* a light's intensity; 0 while it is off */
+    ES_EDIT_NAMED             /* a number of the world, es_world_set_parameter; 0 until it is set */
+} es_edit_parameter_kind;
+typedef struct es_edit_parameter {
+    es_edit_parameter_kind kind;
+    es_camera camera;
+    es_node node;
+    es_light light;
+    uint32_t axis;            /* CAMERA, NODE: 0 x, 1 y, 2 z, in the world */
+    const char* name;         /* NAMED: copied; 1 … 63 bytes */
+} es_edit_parameter;
+typedef struct es_constraint_key { float at; es_anchor reflecting, reflected; es_vec3 direction; } es_constraint_key;
+
+typedef struct es_constraint_desc {
+    const char* name;
+    es_anchor reflecting;     /* the red handle: where in the mirror, on a surface … */
+    es_anchor reflected;      /* … and the green one: what is to be seen there; not read of `refraction` */
+    bool refraction;          /* where light leaves the thing is edited (§7.6.1): */
+    es_vec3 direction;        /* refraction: the way it is to go on, in the axes of the reflecting instance's node; need not be unit */
+    double eye[3];            /* the generating view: from where the mirror was looked into when the constraint was made … */
+    es_quat orientation;      /* … and how, looking along -z: all zero: none. For going back to it; the light reads the place alone */
+    float fov_y;              /* radians, 0 … 3.1; 0: that of the camera */
+    bool follows_view;        /* holds for wherever the active camera is, instead of for the generating view */
+    bool geodesic;            /* its weight falls with the distance over the surface instead of through space (§7.5.2) */
+    es_edit_parameter parameter; /* what the keys go by */
+    const es_constraint_key* keys; /* copied; `at` strictly increasing. Without keys: as above. Between two, places and direction go in a straight line, and the red handle
+                               * from there to the nearest place of its surface; before the first and after the last they stay. Where the two keys' red handles are on
+                               * different instances it changes over at the second */
+    uint32_t key_count;       /* up to 4096 */
+    bool off;
+} es_constraint_desc;
+ES_API es_constraint_desc es_default_constraint_desc(void);
+/* As of regions. Refused too: keys whose `at` do not increase; a refraction without a direction. */
+ES_API es_result es_world_add_constraint(es_world* world, const es_constraint_desc* desc, es_constraint* constraint);
+ES_API es_result es_world_set_constraint(es_world* world, es_constraint constraint, const es_constraint_desc* desc);
+/* name, parameter.name and keys belong to the world and are valid until the constraint is changed. */
+ES_API es_result es_world_get_constraint(const es_world* world, es_constraint constraint, es_constraint_desc* desc);
+ES_API es_result es_world_destroy_constraint(es_world* world, es_constraint constraint);
+
+/* Is it in es_world_edits, and if not, why. */
+typedef enum es_edit_effect {
+    ES_EDIT_ACTIVE,
+    ES_EDIT_OFF,              /* its desc says so */
+    ES_EDIT_UNPLACED,         /* an anchor's kind is NONE, there are no strokes, or what must be on a surface is not */
+    ES_EDIT_STALE,            /* an anchor's instance or triangle is gone */
+    ES_EDIT_NO_PARAMETER,     /* the node, camera or light its keys go by is gone */
+    ES_EDIT_NO_DIRECTION,     /* its two handles are at the same place */
+    ES_EDIT_NO_MEMORY         /* for its distances over the surface */
+} es_edit_effect;
+ES_API const char* es_edit_effect_text(es_edit_effect effect); /* one clause, e.g. "the instance it is on is gone" */
+typedef struct es_constraint_state {
+    es_edit_effect effect;
+    double position[3], target[3]; /* where its handles are now; 0 where they have no place. Refraction: target is position */
+    es_vec3 normal;           /* of the surface at position */
+    es_anchor reflecting;     /* where the red handle is now, between keys too */
+    float influence;          /* the largest that a region has at it: 0, and the constraint is in none */
+    float parameter;          /* what its keys go by is now; 0 without keys */
+} es_constraint_state;
+ES_API es_result es_world_get_constraint_state(const es_world* world, es_constraint constraint, es_constraint_state* state);
+typedef struct es_region_state {
+    es_edit_effect effect;
+    double centre[3];         /* where it is now; of free forms the mean of their strokes' ends */
+    es_vec3 normal;           /* of the surface there; 0 where it is on none */
+} es_region_state;
+ES_API es_result es_world_get_region_state(const es_world* world, es_region region, es_region_state* state);
+/* Of one region at a place: 0 … 1; 0 where the place or the region has no effect. */
+ES_API float es_world_region_influence(const es_world* world, es_region region, const es_anchor* anchor);
+
+/* Numbers by name that edits may go by: up to 1024, names of 1 … 63 bytes, values within 1e9; state of the world. */
+ES_API es_result es_world_set_parameter(es_world* world, const char* name, float value);
+ES_API float es_world_get_parameter(const es_world* world, const char* name); /* 0 when it was never set */
+
+/* §7.2.3: reflections as seen from `eye`, wherever the camera goes, until it is NULL. State of the world. INVALID_ARGUMENT when not finite or beyond 1e9. */
+ES_API es_result es_world_freeze_reflections(es_world* world, const double eye[3]);
+ES_API bool es_world_frozen_reflections(const es_world* world, double eye[3]); /* eye may be NULL; not written when they are not frozen */
+
+/* Distances over a surface, in metres of the world (the node's scale counts, as of present vertices), from a place of it to each vertex of its mesh, by the vertices'
+ * numbers; INFINITY beyond max_distance and where no way leads: meshes may consist of parts. Vertices at one place are one, so that seams are none. */
+typedef enum es_geodesic_method {
+    ES_GEODESIC_FRONT,        /* over the triangles: a wave front from a point source through unfolded triangles, until nothing becomes shorter. Exact on planes */
+    ES_GEODESIC_EDGES         /* along edges (Dijkstra), from the source's nearest vertex: the thesis' (§7.5.2). Too long by up to 15 % on regular triangles, more on worse */
+} es_geodesic_method;
+/* max_distance: 0 or less: all. distances: as many as the mesh has vertices. INVALID_ARGUMENT when there is no such triangle. */
+ES_API es_result es_world_geodesic(const es_world* world, es_instance instance, uint32_t triangle, float u, float v, es_geodesic_method method, float max_distance, float* distances);
+/* At a place of a triangle with edges of squared lengths |second - first|², |third - second|², |first - third|² from the distances of its corners:
+ * d² = sum b_i d_i² - sum b_i b_j |v_i - v_j|², exact for a point source in its plane. INFINITY when a corner's is. */
+ES_API float es_geodesic_between(const float corners[3], const float edges_squared[3], float u, float v);
+
+/* What the light reads of the edits: those in effect, in slot order, resolved; places relative to es_world_origin. */
+#define ES_EVERY_INSTANCE 0xffffffffu
+typedef struct es_resolved_stroke { es_vec3 from, to; float radius; bool erase; } es_resolved_stroke;
+typedef struct es_resolved_region {
+    es_region handle;
+    es_region_type type;
+    es_vec3 centre;
+    float radius, border;
+    uint32_t instance;        /* slot, as in the draw list's ids; EUCLIDEAN: ES_EVERY_INSTANCE */
+    const es_resolved_stroke* strokes; /* FREE_FORM: distance = min over strokes of (distance to the line - radius), with erase max(distance, radius - …), in order */
+    uint32_t stroke_count;
+    const float* distances;   /* GEODESIC: per vertex of the instance's mesh; reaches at least as far as the radius, INFINITY beyond. Otherwise NULL */
+} es_resolved_region;
+typedef struct es_resolved_constraint {
+    es_constraint handle;
+    uint32_t instance, triangle; /* of the red handle */
+    float u, v;
+    es_vec3 position, normal; /* of the red handle */
+    es_vec3 eye;              /* for which it holds: the generating view's, or the active camera's */
+    es_vec3 target;           /* the green handle; refraction: position + direction */
+    es_vec3 direction;        /* edited, unit */
+    bool refraction;
+    const float* distances;   /* with es_constraint_desc.geodesic: per vertex of the red handle's mesh. Otherwise NULL */
+} es_resolved_constraint;
+typedef struct es_edit_list {
+    const es_resolved_region* regions;
+    const es_resolved_constraint* constraints;
+    uint32_t region_count, constraint_count;
+    bool frozen;
+    es_vec3 eye;              /* frozen: of the frozen view */
+} es_edit_list;
+/* Never NULL but for a NULL world; made anew only where something it depends on has changed, by the count of es_world_revisions.edits. Valid until the world changes. */
+ES_API const es_edit_list* es_world_edits(const es_world* world);
+
 /* ---- destroying and enumerating ----------------------------------------------------------------------------------------------------------------- */
 
 /* Refused (WRONG_STATE) while something that exists refers to the object. */
@@ -735,6 +926,8 @@ typedef enum es_object_kind {
     ES_OBJECT_BODY,
     ES_OBJECT_JOINT,
     ES_OBJECT_SOFT,
+    ES_OBJECT_REGION,
+    ES_OBJECT_CONSTRAINT,
     ES_OBJECT_KINDS
 } es_object_kind;
 /* Handles of all objects of a kind in creation-slot order; *count is the capacity in, the number of objects out; ids NULL asks for it. */
@@ -810,6 +1003,7 @@ typedef struct es_world_revisions {
     uint64_t lights;      /* the environment among them */
     uint64_t environment; /* by itself */
     uint64_t camera;      /* active camera: which, its pose, its lens */
+    uint64_t edits;       /* what es_world_edits hands out */
     uint64_t steps;       /* up by one with each es_world_step, by two or more where what was last frame is not the frame before: es_world_restore */
     bool moving;          /* some previous transform, vertex or view differs from the present one */
 } es_world_revisions;

@@ -299,6 +299,7 @@ static uint64_t content_signature(const es_world* world)
 {
     uint64_t hash = 0;
     for (int kind = 0; kind < ES_OBJECT_KINDS; kind++) {
+        if (kind == ES_OBJECT_REGION || kind == ES_OBJECT_CONSTRAINT) continue; /* whole in the state */
         const es_slots* slots = &world->slots[kind];
         for (uint32_t slot = 0; slot < slots->slot_count; slot++) {
             const es_object* object = es_slots_at(slots, slot);

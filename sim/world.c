@@ -5,6 +5,7 @@
 
 #include "platform/maths.h"
 #include "platform/settings.h"
+#include "sim/edits/edits.h"
 #include "sim/rigid/rigid.h"
 #include "sim/soft/soft.h"
 
@@ -24,6 +25,8 @@ static const struct { const char* name; size_t size; uint32_t limit; } kinds[ES_
     [ES_OBJECT_BODY] = {"body", sizeof(es_body_object), ES_SLOT_LIMIT},
     [ES_OBJECT_SOFT] = {"soft body", sizeof(es_soft_object), ES_SLOT_LIMIT},
     [ES_OBJECT_JOINT] = {"joint", sizeof(es_joint_object), ES_SLOT_LIMIT},
+    [ES_OBJECT_REGION] = {"region", sizeof(es_region_object), ES_EDIT_REGIONS},
+    [ES_OBJECT_CONSTRAINT] = {"constraint", sizeof(es_constraint_object), ES_EDIT_CONSTRAINTS},
 };
 
 void* es_world_object(const es_world* world, es_object_kind kind, uint32_t id)
@@ -87,7 +90,7 @@ es_result es_world_create(es_context* context, const es_world_settings* settings
     w->list.material_count = 1;
     /* counted from a number no other world of the context reaches, so that equal revisions mean the same world too */
     uint64_t first = es_context_next_serial(context) << 32;
-    w->revisions = (es_world_revisions){first, first, first, first, first, first, false};
+    w->revisions = (es_world_revisions){first, first, first, first, first, first, first, false};
     es_context_count_object(context, 1);
     *world = w;
     return ES_OK;
@@ -123,6 +126,7 @@ void es_world_destroy(es_world* world)
         if (clip) es_world_destroy_clip(world, (es_clip){clip->object.id});
     }
     es_rigid_free(world);
+    es_edits_free(world);
     for (int kind = 0; kind < ES_OBJECT_KINDS; kind++) es_slots_free(context, &world->slots[kind]);
     es_environment_free(world);
     es_release(context, world->order, world->order_capacity * sizeof *world->order);
@@ -185,7 +189,8 @@ void es_world_settle(es_world* world)
 es_world_revisions es_world_get_revisions(const es_world* world)
 {
     if (!world) return (es_world_revisions){0};
-    es_world_refresh(world);
+    if (world->edits) es_edits_refresh((es_world*)world);
+    else es_world_refresh(world);
     es_world_revisions revisions = world->revisions;
     revisions.moving = world->instances_moving || world->camera_moving;
     return revisions;

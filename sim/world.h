@@ -174,6 +174,9 @@ struct es_world {
     es_recording* recording;       /* that takes notes; NULL: none */
 
     es_world_revisions revisions;
+    uint64_t pose_changes;         /* of nodes: times that one's matrix changed */
+
+    struct es_edits* edits;        /* NULL: there never were any */
 
     es_hand_state hands[ES_HANDS];
     struct es_rigid* rigid;        /* bodies' common parts (sim/rigid/rigid.h); NULL: there never were any */

@@ -1,0 +1,324 @@
+/* Reflection edits as data of a world: handles follow surfaces, keys move them, what is stale has no effect and says why, and the list for the light counts up
+ * exactly where it differs. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "platform/maths.h"
+#include "platform/random.h"
+#include "sim/sim.h"
+
+typedef struct scene { es_context* context; es_world* world; es_mesh mesh; es_node node; es_instance mirror, other; es_camera camera; es_node camera_node; } scene;
+
+/* A mirror, the square of ±1 m in the xy plane, facing +z, of 8 × 8 cells; behind the eye at z = 5 another. */
+static scene open_scene(void)
+{
+    scene s = {0};
+    es_context_desc context = es_default_context_desc();
+    context.threads = 2;
+    assert_int_equal(es_context_create(&context, &s.context), ES_OK);
+    assert_int_equal(es_world_create(s.context, NULL, &s.world), ES_OK);
+    enum { N = 8 };
+    float positions[(N + 1) * (N + 1)][3];
+    uint32_t indices[2 * N * N][3];
+    for (int i = 0; i <= N; i++)
+        for (int k = 0; k <= N; k++) {
+            float* p = positions[i * (N + 1) + k];
+            p[0] = 2.0f * (float)k / N - 1;
+            p[1] = 2.0f * (float)i / N - 1;
+            p[2] = 0;
+        }
+    for (uint32_t i = 0; i < N; i++)
+        for (uint32_t k = 0; k < N; k++) {
+            const uint32_t a = i * (N + 1) + k, corners[6] = {a, a + 1, a + N + 1, a + 1, a + N + 2, a + N + 1};
+            memcpy(indices[2 * (i * N + k)], corners, sizeof corners);
+        }
+    es_mesh_desc mesh = {.name = "square", .vertex_count = (N + 1) * (N + 1), .triangle_count = 2 * N * N, .positions = positions[0], .indices = indices[0]};
+    assert_int_equal(es_world_add_mesh(s.world, &mesh, &s.mesh), ES_OK);
+    assert_int_equal(es_world_add_node(s.world, &(es_node_desc){.name = "mirror"}, &s.node), ES_OK);
+    es_node there;
+    assert_int_equal(es_world_add_node(s.world, &(es_node_desc){.name = "other", .transform = {{0, 0, 9}, {0, 1, 0, 0}, {1, 1, 1}}}, &there), ES_OK);
+    assert_int_equal(es_world_add_instance(s.world, &(es_instance_desc){.node = s.node, .mesh = s.mesh}, &s.mirror), ES_OK);
+    assert_int_equal(es_world_add_instance(s.world, &(es_instance_desc){.node = there, .mesh = s.mesh}, &s.other), ES_OK);
+    assert_int_equal(es_world_add_node(s.world, &(es_node_desc){.name = "eye", .transform = {.translation = {0, 0, 5}}}, &s.camera_node), ES_OK);
+    es_camera_desc camera = es_default_camera_desc();
+    camera.node = s.camera_node;
+    assert_int_equal(es_world_add_camera(s.world, &camera, &s.camera), ES_OK);
+    return s;
+}
+
+static void close_scene(scene* s)
+{
+    es_world_destroy(s->world);
+    assert_int_equal(es_context_bytes(s->context), 0);
+    es_context_destroy(s->context);
+}
+
+static es_anchor anchor_at(const scene* s, es_instance instance, double x, double y, double z)
+{
+    es_anchor anchor;
+    assert_int_equal(es_world_anchor_of_point(s->world, instance, (const double[3]){x, y, z}, &anchor), ES_OK);
+    assert_int_equal(anchor.kind, ES_ANCHOR_SURFACE);
+    return anchor;
+}
+
+static es_constraint_desc constraint_desc(const scene* s)
+{
+    es_constraint_desc d = es_default_constraint_desc();
+    d.name = "face";
+    d.reflecting = anchor_at(s, s->mirror, 0.3, 0.2, 0);
+    d.reflected = anchor_at(s, s->other, -0.5, 0.5, 9);
+    d.eye[2] = 5;
+    return d;
+}
+
+static es_constraint add_constraint(const scene* s, const es_constraint_desc* d)
+{
+    es_constraint constraint;
+    assert_int_equal(es_world_add_constraint(s->world, d, &constraint), ES_OK);
+    return constraint;
+}
+
+static es_region add_region(const scene* s, es_region_type type, float radius)
+{
+    es_region region;
+    es_region_desc d = es_default_region_desc();
+    d.type = type;
+    d.centre = anchor_at(s, s->mirror, 0.25, 0.25, 0);
+    d.radius = radius;
+    assert_int_equal(es_world_add_region(s->world, &d, &region), ES_OK);
+    return region;
+}
+
+static es_constraint_state state_of(const scene* s, es_constraint constraint)
+{
+    es_constraint_state state;
+    assert_int_equal(es_world_get_constraint_state(s->world, constraint, &state), ES_OK);
+    return state;
+}
+
+static void assert_place(const double p[3], double x, double y, double z)
+{
+    if (!(fabs(p[0] - x) < 1e-5 && fabs(p[1] - y) < 1e-5 && fabs(p[2] - z) < 1e-5)) fail_msg("at %g %g %g, not %g %g %g", p[0], p[1], p[2], x, y, z);
+}
+
+static void test_handles_follow_their_surfaces(void** state)
+{
+    scene s = open_scene();
+    es_constraint_desc d = constraint_desc(&s);
+    es_constraint c = add_constraint(&s, &d);
+    assert_place(state_of(&s, c).position, 0.3, 0.2, 0);
+    assert_place(state_of(&s, c).target, -0.5, 0.5, 9);
+    assert_true(fabsf(state_of(&s, c).normal.z - 1) < 1e-6f);
+    es_transform t = {{1, 2, 3}, es_quat_from_axis_angle(es_v3(0, 1, 0), ES_PI / 2), {2, 2, 2}};
+    assert_int_equal(es_world_set_node_transform(s.world, s.node, &t), ES_OK);
+    assert_place(state_of(&s, c).position, 1, 2.4, 2.4);
+    assert_true(fabsf(state_of(&s, c).normal.x - 1) < 1e-6f);
+    float positions[81 * 3];
+    for (int v = 0; v < 81; v++) {
+        const float* p = es_world_mesh(s.world, s.mesh)->positions + 4 * v;
+        positions[3 * v] = p[0];
+        positions[3 * v + 1] = p[1];
+        positions[3 * v + 2] = 0.5f;
+    }
+    assert_int_equal(es_world_deform_mesh(s.world, s.mesh, positions, NULL), ES_OK);
+    assert_place(state_of(&s, c).position, 2, 2.4, 2.4);
+    const es_edit_list* list = es_world_edits(s.world);
+    assert_int_equal(list->constraint_count, 1);
+    const es_resolved_constraint* r = &list->constraints[0];
+    assert_true(r->handle.id == c.id && r->instance == (s.mirror.id & 0xfffff) && fabsf(r->position.x - 2) < 1e-5f && r->eye.z == 5 && !r->distances);
+    es_vec3 to = es_v3_sub(r->target, r->position);
+    assert_true(fabsf(es_v3_dot(to, r->direction) - es_v3_length(to)) < 1e-4f);
+    close_scene(&s);
+}
+
+static void test_regions_have_influence_where_they_are(void** state)
+{
+    scene s = open_scene();
+    es_constraint_desc d = constraint_desc(&s);
+    d.reflecting = anchor_at(&s, s.mirror, 0.25, 0.65, 0);
+    es_constraint c = add_constraint(&s, &d);
+    assert_true(state_of(&s, c).influence == 0);
+    es_region types[2] = {add_region(&s, ES_REGION_EUCLIDEAN, 0.5f), add_region(&s, ES_REGION_GEODESIC, 0.5f)};
+    for (int i = 0; i < 2; i++) {
+        /* 0.4 m from the middle, half-way through the border */
+        assert_true(fabsf(es_world_region_influence(s.world, types[i], &d.reflecting) - 0.5f) < 1e-4f);
+        es_anchor inside = anchor_at(&s, s.mirror, 0.3, 0.3, 0), outside = anchor_at(&s, s.mirror, -0.5, 0.3, 0), elsewhere = anchor_at(&s, s.other, 0.3, 0.3, 9);
+        assert_true(es_world_region_influence(s.world, types[i], &inside) == 1);
+        assert_true(es_world_region_influence(s.world, types[i], &outside) == 0);
+        assert_true(es_world_region_influence(s.world, types[i], &elsewhere) == 0);
+    }
+    assert_true(fabsf(state_of(&s, c).influence - 0.5f) < 1e-4f);
+    es_region_stroke strokes[2] = {{anchor_at(&s, s.mirror, -0.8, -0.5, 0), anchor_at(&s, s.mirror, 0.8, -0.5, 0), 0.3f, false}, {anchor_at(&s, s.mirror, 0, -0.5, 0), anchor_at(&s, s.mirror, 0.1, -0.5, 0), 0.3f, true}};
+    es_region_desc free_form = {.type = ES_REGION_FREE_FORM, .border = 0.1f, .strokes = strokes, .stroke_count = 2};
+    es_region drawn;
+    assert_int_equal(es_world_add_region(s.world, &free_form, &drawn), ES_OK);
+    es_anchor at = anchor_at(&s, s.mirror, -0.5, -0.5, 0), erased = anchor_at(&s, s.mirror, 0.05, -0.5, 0), edge = anchor_at(&s, s.mirror, -0.5, -0.25, 0);
+    assert_true(es_world_region_influence(s.world, drawn, &at) == 1);
+    assert_true(es_world_region_influence(s.world, drawn, &erased) == 0);
+    assert_true(fabsf(es_world_region_influence(s.world, drawn, &edge) - 0.5f) < 1e-4f);
+    const es_edit_list* list = es_world_edits(s.world);
+    assert_int_equal(list->region_count, 3);
+    assert_true(list->regions[0].instance == ES_EVERY_INSTANCE && list->regions[1].distances && list->regions[2].stroke_count == 2 && list->regions[2].strokes[1].erase);
+    close_scene(&s);
+}
+
+static void test_stale_edits_have_no_effect_and_say_why(void** state)
+{
+    scene s = open_scene();
+    es_constraint_desc d = constraint_desc(&s);
+    es_constraint c = add_constraint(&s, &d);
+    es_region region = add_region(&s, ES_REGION_GEODESIC, 0.5f);
+    assert_int_equal(es_world_destroy_instance(s.world, s.other), ES_OK);
+    assert_int_equal(state_of(&s, c).effect, ES_EDIT_STALE);
+    assert_int_equal(es_world_edits(s.world)->constraint_count, 0);
+    d.reflected = (es_anchor){.kind = ES_ANCHOR_POINT, .point = {0, 1, 2}};
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    assert_int_equal(state_of(&s, c).effect, ES_EDIT_ACTIVE);
+    assert_int_equal(es_world_destroy_instance(s.world, s.mirror), ES_OK);
+    assert_int_equal(state_of(&s, c).effect, ES_EDIT_STALE);
+    es_region_state r;
+    assert_int_equal(es_world_get_region_state(s.world, region, &r), ES_OK);
+    assert_int_equal(r.effect, ES_EDIT_STALE);
+    assert_int_equal(es_world_edits(s.world)->region_count, 0);
+    close_scene(&s);
+}
+
+static void test_bad_numbers_are_refused(void** state)
+{
+    scene s = open_scene();
+    es_constraint_desc good = constraint_desc(&s), d;
+    es_constraint c;
+    es_constraint_key keys[2] = {{1, good.reflecting, good.reflected, {0}}, {1, good.reflecting, good.reflected, {0}}};
+#define REFUSED(change) (d = good, change, assert_int_equal(es_world_add_constraint(s.world, &d, &c), ES_INVALID_ARGUMENT))
+    REFUSED(d.reflecting.u = NAN);
+    REFUSED(d.reflecting.v = -0.1f);
+    REFUSED(d.reflecting.kind = ES_ANCHOR_POINT);
+    REFUSED(d.reflected = ((es_anchor){.kind = ES_ANCHOR_POINT, .point = {0, INFINITY, 0}}));
+    REFUSED(d.eye[1] = (double)NAN);
+    REFUSED(d.orientation.w = NAN);
+    REFUSED(d.fov_y = 4);
+    REFUSED(d.refraction = true); /* without a direction */
+    REFUSED((d.keys = keys, d.key_count = 2));
+    REFUSED((d.parameter.kind = ES_EDIT_NAMED));
+    REFUSED((d.key_count = 3));
+    es_region_desc region = es_default_region_desc();
+    es_region r;
+    region.radius = NAN;
+    assert_int_equal(es_world_add_region(s.world, &region, &r), ES_INVALID_ARGUMENT);
+    assert_int_equal(es_world_set_parameter(s.world, "x", NAN), ES_INVALID_ARGUMENT);
+    assert_int_equal(es_world_set_parameter(s.world, "", 1), ES_INVALID_ARGUMENT);
+    assert_int_equal(es_world_freeze_reflections(s.world, (const double[3]){0, (double)NAN, 0}), ES_INVALID_ARGUMENT);
+    size_t count = 0;
+    assert_int_equal(es_world_enumerate(s.world, ES_OBJECT_CONSTRAINT, NULL, &count), ES_OK);
+    assert_int_equal(count, 0);
+    close_scene(&s);
+}
+
+static uint64_t revision(const scene* s) { return es_world_get_revisions(s->world).edits; }
+
+static void test_the_list_counts_what_differs(void** state)
+{
+    scene s = open_scene();
+    uint64_t r = revision(&s);
+    es_constraint_desc d = constraint_desc(&s);
+    es_constraint c = add_constraint(&s, &d);
+    assert_true(revision(&s) == r + 1);
+    assert_true(revision(&s) == r + 1);
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK); /* the same */
+    assert_true(revision(&s) == r + 1);
+    es_transform eye = {.translation = {1, 0, 5}};
+    assert_int_equal(es_world_set_node_transform(s.world, s.camera_node, &eye), ES_OK);
+    assert_true(revision(&s) == r + 1); /* it holds for its own view */
+    d.follows_view = true;
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    assert_true(revision(&s) == r + 2);
+    eye.translation.y = 1;
+    assert_int_equal(es_world_set_node_transform(s.world, s.camera_node, &eye), ES_OK);
+    assert_true(revision(&s) == r + 3);
+    assert_true(es_world_edits(s.world)->constraints[0].eye.y == 1);
+    assert_int_equal(es_world_freeze_reflections(s.world, (const double[3]){1, 2, 3}), ES_OK);
+    assert_true(revision(&s) == r + 4 && es_world_edits(s.world)->frozen && es_world_edits(s.world)->eye.z == 3);
+    assert_int_equal(es_world_freeze_reflections(s.world, NULL), ES_OK);
+    assert_true(revision(&s) == r + 5 && !es_world_frozen_reflections(s.world, NULL));
+    assert_int_equal(es_world_destroy_constraint(s.world, c), ES_OK);
+    assert_true(revision(&s) == r + 6);
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_STALE_HANDLE);
+    close_scene(&s);
+}
+
+static void test_keys_go_by_their_parameter(void** state)
+{
+    scene s = open_scene();
+    es_constraint_desc d = constraint_desc(&s);
+    es_constraint_key keys[3] = {{1, anchor_at(&s, s.mirror, -0.6, 0, 0), {.kind = ES_ANCHOR_POINT, .point = {0, 0, 4}}, {0}},
+        {3, anchor_at(&s, s.mirror, 0.6, 0.4, 0), {.kind = ES_ANCHOR_POINT, .point = {2, 0, 4}}, {0}},
+        {4, anchor_at(&s, s.other, 0, 0, 9), {.kind = ES_ANCHOR_POINT, .point = {2, 0, 4}}, {0}}};
+    d.keys = keys;
+    d.key_count = 3;
+    d.parameter = (es_edit_parameter){.kind = ES_EDIT_NAMED, .name = "turn"};
+    es_constraint c = add_constraint(&s, &d);
+    static const struct { float at; double red[3], green; } expected[] = {{0, {-0.6, 0, 0}, 0}, {1, {-0.6, 0, 0}, 0}, {2, {0, 0.2, 0}, 1}, {2.5f, {0.3, 0.3, 0}, 1.5}, {3, {0.6, 0.4, 0}, 2}, {3.5f, {0.6, 0.4, 0}, 2}, {4, {0, 0, 9}, 2}, {99, {0, 0, 9}, 2}};
+    for (size_t i = 0; i < sizeof expected / sizeof expected[0]; i++) {
+        assert_int_equal(es_world_set_parameter(s.world, "turn", expected[i].at), ES_OK);
+        es_constraint_state now = state_of(&s, c);
+        assert_int_equal(now.effect, ES_EDIT_ACTIVE);
+        assert_place(now.position, expected[i].red[0], expected[i].red[1], expected[i].red[2]);
+        assert_place(now.target, expected[i].green, 0, 4);
+    }
+    d.parameter = (es_edit_parameter){.kind = ES_EDIT_CAMERA, .axis = 2};
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    assert_true(state_of(&s, c).parameter == 5);
+    d.parameter = (es_edit_parameter){.kind = ES_EDIT_NODE, .node = {77}};
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    assert_int_equal(state_of(&s, c).effect, ES_EDIT_NO_PARAMETER);
+    d.parameter = (es_edit_parameter){.kind = ES_EDIT_TIME};
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    assert_int_equal(es_world_step(s.world, 2), ES_OK);
+    assert_place(state_of(&s, c).position, 0, 0.2, 0);
+    close_scene(&s);
+}
+
+static void test_picking_finds_the_first_surface(void** state)
+{
+    scene s = open_scene();
+    es_anchor anchor;
+    double place[3];
+    es_vec3 normal;
+    assert_int_equal(es_world_anchor_of_ray(s.world, (const double[3]){0.1, 0.3, 5}, es_v3(0, 0, -3), 100, &anchor), ES_OK);
+    assert_true(anchor.kind == ES_ANCHOR_SURFACE && anchor.instance.id == s.mirror.id && es_world_resolve_anchor(s.world, &anchor, place, &normal));
+    assert_place(place, 0.1, 0.3, 0);
+    assert_int_equal(es_world_anchor_of_ray(s.world, (const double[3]){0.1, 0.3, 5}, es_v3(0, 0, 3), 100, &anchor), ES_OK);
+    assert_true(anchor.instance.id == s.other.id);
+    assert_int_equal(es_world_anchor_of_ray(s.world, (const double[3]){0.1, 0.3, 5}, es_v3(0, 0, -3), 4.9f, &anchor), ES_OK);
+    assert_int_equal(anchor.kind, ES_ANCHOR_NONE);
+    assert_int_equal(es_world_anchor_of_triangle(s.world, s.mirror, 128, 0, 0, &anchor), ES_INVALID_ARGUMENT);
+    /* the nearest place, against looking at them all */
+    for (uint32_t i = 0; i < 50; i++) {
+        const double p[3] = {3.0 * (double)es_random_float(1, i) - 1.5, 3.0 * (double)es_random_float(2, i) - 1.5, 0.7};
+        es_anchor near = anchor_at(&s, s.mirror, p[0], p[1], p[2]);
+        assert_true(es_world_resolve_anchor(s.world, &near, place, NULL));
+        assert_place(place, fmax(-1, fmin(1, p[0])), fmax(-1, fmin(1, p[1])), 0);
+    }
+    close_scene(&s);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_handles_follow_their_surfaces),
+        cmocka_unit_test(test_regions_have_influence_where_they_are),
+        cmocka_unit_test(test_stale_edits_have_no_effect_and_say_why),
+        cmocka_unit_test(test_bad_numbers_are_refused),
+        cmocka_unit_test(test_the_list_counts_what_differs),
+        cmocka_unit_test(test_keys_go_by_their_parameter),
+        cmocka_unit_test(test_picking_finds_the_first_surface),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
