@@ -15,6 +15,7 @@ typedef struct es_direct_job {
     const es_screen_view* repair;  /* of that G-buffer; NULL: nothing is */
     uint32_t repair_samples;       /* of a segment towards the light as long as the bias, or, where that is longer, repair_least, metres */
     float repair_least;
+    const float* edited[3];        /* where lobes reflect, rows of gbuffer->stride, (0, 0, 0) where they do as the law says (gi/edit/edit.h); NULL: everywhere */
     bool first;                    /* overwrite instead of adding */
     float* out[3];                 /* reflected radiance, rows of gbuffer->stride */
 } es_direct_job;

@@ -88,6 +88,10 @@ typedef struct es_shade_job {
     uint32_t repair_samples;       /* of a segment towards the light as long as the bias, and as repair_most, metres, at the most */
     float repair_most;
     uint32_t seed;                 /* of what is random with sampled and near */
+    /* where pixels' lobes reflect, (0, 0, 0) where they do as the law says (gi/edit/edit.h); NULL: everywhere. Pixel (x, y) is that of edited_spacing times x and y. Light
+     * found near is not edited */
+    const float* edited[3];
+    uint32_t edited_stride, edited_spacing;
     /* out, rows of gbuffer->stride; 0 where nothing is seen */
     float* irradiance[3];
     float* specular[3];            /* NULL: pixels have no lobes */
@@ -139,6 +143,8 @@ struct es_shade_batch {
     int32_t model[ES_SHADE_LANES];
     uint8_t lobed[ES_SHADE_LANES / 8];  /* per vector: does a pixel of it have a lobe? */
     uint8_t wide[ES_SHADE_LANES / 8];   /* per vector: have they es_shade_job.wide's? Then they are no lobed ones until all lights are added */
+    uint8_t edited[ES_SHADE_LANES / 8]; /* per vector: is a lobed pixel's direction edited? Its directions are in turned */
+    float turned[3][ES_SHADE_LANES];
     float s[3][ES_SHADE_LANES];
     /* with es_shade_visibility or es_shade_near */
     float ox[ES_SHADE_LANES], oy[ES_SHADE_LANES], oz[ES_SHADE_LANES]; /* where rays begin */

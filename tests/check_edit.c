@@ -58,16 +58,11 @@ static void fill(content* c)
         es_edit_region* region = &c->regions[i];
         const uint32_t first = random_bits() % CONSTRAINTS;
         *region = (es_edit_region){.shape = random_bits() % 3, .instance = random_bits() % 3, .centre = {uniform(-1, 1), uniform(-1, 1), uniform(-2, 0)}, .radius = uniform(0.01f, 3), .border = random_bits() % 4 ? uniform(0, 1) : 0.0f, .strokes = c->strokes,
-            .stroke_count = random_bits() % (STROKES + 1), .distances = c->fields[i], .mesh = {c->positions, c->indices, es_mat4_identity()}, .constraints = c->constraints + first, .constraint_count = 1 + random_bits() % (CONSTRAINTS - first)};
-        if (region->shape == ES_EDIT_GEODESIC) region->instance = 1 + random_bits() % 2;
-        else
-            for (uint32_t k = 0; k < region->constraint_count; k++) c->constraints[first + k].distances = NULL;
+            .stroke_count = random_bits() % (STROKES + 1), .distances = c->fields[i], .mesh = {1 + random_bits() % 2, c->positions, c->indices, es_mat4_identity()}, .constraints = c->constraints + first, .constraint_count = 1 + random_bits() % (CONSTRAINTS - first)};
+        if (region->shape == ES_EDIT_GEODESIC) region->instance = region->mesh.instance;
         memcpy(region->ball, region->centre, sizeof region->centre);
         region->ball[3] = random_bits() % 3 ? 1e4f : region->radius * region->radius;
     }
-    /* constraints are shared here: those with distances belong to geodesic regions alone */
-    for (int i = 0; i < REGIONS; i++)
-        for (uint32_t k = 0; c->regions[i].shape != ES_EDIT_GEODESIC && k < c->regions[i].constraint_count; k++) ((es_edit_constraint*)(uintptr_t)c->regions[i].constraints)[k].distances = NULL;
 }
 
 static es_gbuffer new_gbuffer(uint32_t width, uint32_t height)

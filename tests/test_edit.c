@@ -335,9 +335,9 @@ static void test_strokes(void** state)
                 else if (signed_distance < -0.0501f) assert_true(angle_between(d, e) < 2e-5f);
             }
     }
-    assert_true(es_edit_influence(&region, es_v3(0.5f, 0, 0), 0) == 1.0f);
-    assert_true(es_edit_influence(&region, es_v3(0, 0.05f, 0), 0) == 0.0f);
-    assert_true(es_edit_influence(&region, es_v3(0.5f, 0.175f, 0), 0) > 0.4f);
+    assert_true(es_edit_influence(&region, es_v3(0.5f, 0, 0), 2, 0) == 1.0f);
+    assert_true(es_edit_influence(&region, es_v3(0, 0.05f, 0), 2, 0) == 0.0f);
+    assert_true(es_edit_influence(&region, es_v3(0.5f, 0.175f, 0), 2, 0) > 0.4f);
     free_wall(&w);
 }
 
@@ -371,7 +371,7 @@ static void test_geodesic(void** state)
     for (int k = 0; k < 3; k++) flat_planes[k] = memcpy(malloc(bytes), w.planes[k], bytes);
     region.shape = ES_EDIT_GEODESIC;
     region.distances = distances;
-    region.mesh = (es_edit_mesh){positions, indices, half};
+    region.mesh = (es_edit_mesh){1, positions, indices, half};
     run(&w, &region, 1);
     for (uint32_t y = 0; y < SIZE; y++)
         for (uint32_t x = 0; x < SIZE; x++)

@@ -28,11 +28,13 @@ void es_edit_constraint_matrix(es_vec3 reflected, es_vec3 edited, float matrix[9
         for (int k = 0; k < 3; k++) matrix[3 * i + k] = e[i] * r[k] + ES_EDIT_SHORTEST_ARC * s[3 * i + k];
 }
 
-float es_edit_influence(const es_edit_region* region, es_vec3 place, uint32_t triangle)
+float es_edit_influence(const es_edit_region* region, es_vec3 at, uint32_t instance, uint32_t triangle)
 {
-    es_edit_place_v of;
-    const vf p[3] = {vf_set1(place.x), vf_set1(place.y), vf_set1(place.z)};
-    return es_edit_influence_v(region, vm_all_lanes(), p, vi_set1((int32_t)triangle), &of)[0];
+    if (region->instance && region->instance != instance) return 0.0f;
+    const vf p[3] = {vf_set1(at.x), vf_set1(at.y), vf_set1(at.z)};
+    es_edit_place_v place = {.lanes = vi_zero()};
+    if (region->mesh.positions && region->mesh.instance == instance) place = es_edit_place_of_v(&region->mesh, vm_all_lanes(), vi_set1((int32_t)triangle), p);
+    return es_edit_influence_v(region, vm_all_lanes(), p, &place)[0];
 }
 
 typedef struct edit_loop { const es_gi_kernels* kernels; const es_edit_job* job; } edit_loop;

@@ -7,7 +7,7 @@
  * near; with δ = 1/100 the one that turns no more than it must is chosen, and since S_n r_n = e_n nothing else changes where one constraint decides. Where r_n and e_n are
  * opposite the axis is a fixed one across r_n. Distances count in radii of the region and are kept from 0 by 1e-6 of it, so that weights stay below 1e12: at a constraint
  * the others are lost in rounding, and e = e_n there.
- * Euclidean and free-form regions measure d in space, geodesic ones along the surface (sim/edits/). */
+ * Each region and each constraint measures d in space or along the surface (sim/edits/). */
 #ifndef EARTHSHINE_GI_EDIT_EDIT_H
 #define EARTHSHINE_GI_EDIT_EDIT_H
 
@@ -24,6 +24,7 @@ typedef struct es_edit_stroke { float from[3], to[3], radius; bool erases; } es_
 
 /* What pixels of an instance lie on: distances belong to its vertices. */
 typedef struct es_edit_mesh {
+    uint32_t instance;             /* word of the G-buffer */
     const float* positions;        /* records of four floats */
     const uint32_t* indices;
     es_mat4 transform;
@@ -32,7 +33,7 @@ typedef struct es_edit_mesh {
 typedef struct es_edit_constraint {
     float position[3];
     float matrix[9];               /* e rᵀ + δ S, row by row */
-    const float* distances;        /* of the vertices of its region's mesh; NULL: in space */
+    const float* distances;        /* of the vertices of its region's mesh; elsewhere, and with NULL, distances are in space */
 } es_edit_constraint;
 
 typedef struct es_edit_region {
@@ -43,7 +44,7 @@ typedef struct es_edit_region {
     const es_edit_stroke* strokes;
     uint32_t stroke_count;
     const float* distances;        /* GEODESIC: of the vertices */
-    es_edit_mesh mesh;             /* GEODESIC */
+    es_edit_mesh mesh;             /* that distances belong to, the constraints' as well; all zero: there are none */
     const es_edit_constraint* constraints;
     uint32_t constraint_count;     /* 1 or more */
 } es_edit_region;
@@ -61,8 +62,8 @@ typedef struct es_edit_job {
 
 /* The matrix of es_edit_constraint of two unit vectors. */
 void es_edit_constraint_matrix(es_vec3 reflected, es_vec3 edited, float matrix[9]);
-/* The region's influence a at a place, on a point of a triangle of its mesh where it is geodesic: 0 … 1. */
-float es_edit_influence(const es_edit_region* region, es_vec3 place, uint32_t triangle);
+/* The region's influence a at a place on a triangle of an instance, by the latter's word of the G-buffer: 0 … 1. */
+float es_edit_influence(const es_edit_region* region, es_vec3 place, uint32_t instance, uint32_t triangle);
 /* Works on the context's threads. */
 void es_edit_directions(es_context* context, const es_edit_job* job);
 

@@ -2,6 +2,7 @@
  * taps that the light reaches.
  */
 #include "gi/kernel_table.h"
+#include "gi/kernels/edited_lobe_simd.h"
 #include "gi/kernels/light_strength_simd.h"
 #include "gi/kernels/screen_test_simd.h"
 #include "gi/kernels/shadow_map_simd.h"
@@ -143,6 +144,12 @@ static void repair(const direct_row* row, stretch* s)
     }
 }
 
+static void edit_lobe(const es_direct_job* job, size_t at, const es_surface_v* surface, const vf n[3], const vf l[3], const vf v[3], vf lobe[3])
+{
+    const vf e[3] = {vf_load(job->edited[0] + at), vf_load(job->edited[1] + at), vf_load(job->edited[2] + at)};
+    if (vm_any(vm_gt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2], vf_zero()))) es_edited_lobe_v(surface, n, l, v, e, lobe);
+}
+
 static void reflect(const direct_row* row, const stretch* s)
 {
     const es_direct_job* job = row->job;
@@ -168,7 +175,13 @@ static void reflect(const direct_row* row, const stretch* s)
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : d[k] * inverse;
             es_unpack_normal_v(vi_load(g->normal + at), &nx, &ny, &nz);
             es_lift_to_horizon_v(nx, ny, nz, &v[0], &v[1], &v[2]);
-            es_surface_reflect_gbuffer_v(rg, b, word, nx, ny, nz, vf_load(s->towards[0] + from), vf_load(s->towards[1] + from), vf_load(s->towards[2] + from), v[0], v[1], v[2], &f[0], &f[1], &f[2]);
+            const vf towards[3] = {vf_load(s->towards[0] + from), vf_load(s->towards[1] + from), vf_load(s->towards[2] + from)};
+            const es_surface_v surface = es_surface_of_gbuffer_v(rg, b, word);
+            vf pass, lobe[3];
+            es_surface_parts_v(&surface, nx, ny, nz, towards[0], towards[1], towards[2], v[0], v[1], v[2], &pass, lobe);
+            if (job->edited[0]) edit_lobe(job, at, &surface, (const vf[3]){nx, ny, nz}, towards, v, lobe);
+            pass = pass * vf_set1(0.318309886f);
+            for (int k = 0; k < 3; k++) f[k] = surface.albedo[k] * pass + lobe[k];
         }
         /* irradiance of the light times the model; cos is in the irradiance */
         const vf e = strength * vf_max(vf_load(s->cosine + from), vf_zero());

@@ -53,12 +53,9 @@ VINL es_matrix3_v region_rotation(const es_edit_region* region, const edit_pixel
     for (int i = 0; i < 9; i++) sum.at[i] = vf_zero();
     for (uint32_t n = 0; n < region->constraint_count; n++) {
         const es_edit_constraint* c = &region->constraints[n];
-        vf square;
-        if (c->distances) square = es_edit_geodesic_square_v(place, c->distances);
-        else {
-            const vf at[3] = {vf_set1(c->position[0]), vf_set1(c->position[1]), vf_set1(c->position[2])};
-            square = es_edit_square_v(pixels->p, at);
-        }
+        const vf at[3] = {vf_set1(c->position[0]), vf_set1(c->position[1]), vf_set1(c->position[2])};
+        vf square = es_edit_square_v(pixels->p, at);
+        if (c->distances) square = vf_select(place->lanes, es_edit_geodesic_square_v(place, c->distances), square);
         const vf weight = one / (vf_min(square * per, vf_set1(1e12f)) + vf_set1(1e-12f));
         for (int i = 0; i < 9; i++) sum.at[i] = sum.at[i] + weight * vf_set1(c->matrix[i]);
     }
@@ -74,8 +71,9 @@ VINL void add_region(const es_edit_region* region, const edit_pixels* pixels, ed
     vm lanes = pixels->seen & vm_le(es_edit_square_v(pixels->p, ball), vf_set1(region->ball[3]));
     if (region->instance) lanes = lanes & vi_eq(pixels->instance, vi_set1((int32_t)region->instance));
     if (!vm_any(lanes)) return;
-    es_edit_place_v place;
-    const vf influence = es_edit_influence_v(region, lanes, pixels->p, pixels->triangle, &place);
+    es_edit_place_v place = {.lanes = vi_zero()};
+    if (region->mesh.positions) place = es_edit_place_of_v(&region->mesh, lanes & vi_eq(pixels->instance, vi_set1((int32_t)region->mesh.instance)), pixels->triangle, pixels->p);
+    const vf influence = es_edit_influence_v(region, lanes, pixels->p, &place);
     if (!vm_any(vm_gt(influence, vf_zero()))) return;
     const es_matrix3_v rotation = region_rotation(region, pixels, &place);
     for (int i = 0; i < 9; i++) sum->rotation.at[i] = sum->rotation.at[i] + influence * rotation.at[i];

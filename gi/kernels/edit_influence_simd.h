@@ -5,8 +5,8 @@
 #include "gi/edit/edit.h"
 #include "platform/simd.h"
 
-/* On a triangle: its corners, what each counts for, and the squared lengths that the distance between them needs. */
-typedef struct es_edit_place_v { vi corner[3]; vf share[3], sag; } es_edit_place_v;
+/* On a triangle of the mesh, in some lanes: its corners, what each counts for, and what the distance between them is short of by theirs. */
+typedef struct es_edit_place_v { vm lanes; vi corner[3]; vf share[3], sag; } es_edit_place_v;
 
 VINL vf es_edit_square_v(const vf a[3], const vf b[3])
 {
@@ -17,7 +17,7 @@ VINL vf es_edit_square_v(const vf a[3], const vf b[3])
 /* `triangle`: of the mesh, any where lanes are unset. */
 VINL es_edit_place_v es_edit_place_of_v(const es_edit_mesh* mesh, vm lanes, vi triangle, const vf p[3])
 {
-    es_edit_place_v place;
+    es_edit_place_v place = {.lanes = lanes};
     const vi at = (lanes & triangle) * vi_set1(3);
     vf v[3][3];
     const float* t = mesh->transform.m;
@@ -91,19 +91,15 @@ VINL vf es_edit_strokes_v(const es_edit_region* region, const vf p[3])
     return d;
 }
 
-/* a, 0 … 1; `place` is set by geodesic regions. */
-VINL vf es_edit_influence_v(const es_edit_region* region, vm lanes, const vf p[3], vi triangle, es_edit_place_v* place)
+/* a, 0 … 1. place: looked at by geodesic regions. */
+VINL vf es_edit_influence_v(const es_edit_region* region, vm lanes, const vf p[3], const es_edit_place_v* place)
 {
     /* metres within the outer edge */
     vf inside;
     if (region->shape == ES_EDIT_STROKES) inside = vf_neg(es_edit_strokes_v(region, p));
     else {
         const vf centre[3] = {vf_set1(region->centre[0]), vf_set1(region->centre[1]), vf_set1(region->centre[2])};
-        vf square;
-        if (region->shape == ES_EDIT_GEODESIC) {
-            *place = es_edit_place_of_v(&region->mesh, lanes, triangle, p);
-            square = es_edit_geodesic_square_v(place, region->distances);
-        } else square = es_edit_square_v(p, centre);
+        const vf square = region->shape == ES_EDIT_GEODESIC ? vf_select(place->lanes, es_edit_geodesic_square_v(place, region->distances), vf_set1(1e30f)) : es_edit_square_v(p, centre);
         inside = vf_set1(region->radius) - vf_sqrt(square);
     }
     const vf border = vf_set1(region->border > 1e-12f ? region->border : 1e-12f);

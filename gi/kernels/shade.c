@@ -8,6 +8,7 @@
 #include <stddef.h>
 
 #include "gi/kernel_table.h"
+#include "gi/kernels/edited_lobe_simd.h"
 #include "gi/kernels/lobe_albedo_simd.h"
 #include "gi/kernels/phases_simd.h"
 #include "gi/kernels/screen_test_simd.h"
@@ -50,6 +51,20 @@ static vf spread_number(const es_shade_job* job, vi index, uint32_t shift, uint3
 {
     vu bits = (vu)index * (vu)vi_set1((int32_t)step) + (vu)vi_set1((int32_t)((job->seed + 1u) * shift)); /* modulo 2^32 */
     return vf_from_int(vi_shift_right_logical((vi)bits, 8)) * vf_set1(1.0f / 16777216.0f);
+}
+
+/* Into the batch; false where none of the eight is edited. */
+static bool load_edited(const es_shade_job* job, uint32_t y, vi x, es_shade_batch* batch, uint32_t at)
+{
+    const size_t row = (size_t)y * job->edited_spacing * job->edited_stride;
+    const vi column = x * vi_set1((int32_t)job->edited_spacing);
+    vm any = vi_zero();
+    for (int k = 0; k < 3; k++) {
+        const vf e = vf_gather(job->edited[k] + row, column);
+        vf_store(batch->turned[k] + at, e);
+        any |= vm_ne(e, vf_zero());
+    }
+    return vm_any(any);
 }
 
 static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_batch* batch, bool with_lobes, bool* any_lobe)
@@ -131,12 +146,24 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
             if (batch->wide[at / VW]) lobed = vi_zero();
             lobes |= lobed;
             batch->lobed[at / VW] = vm_any(lobed);
+            batch->edited[at / VW] = job->edited[0] && batch->lobed[at / VW] && load_edited(job, y, x, batch, at);
             vm phong = vi_eq(surface.model, vi_set1(ES_SURFACE_PHONG));
             vf_store(batch->roughness + at, vf_select(phong, vf_min(surface.roughness, vf_set1(most_exponent)), vf_max(surface.roughness, vf_set1(job->lobe_roughness))));
             vi_store(batch->model + at, surface.model);
         }
     }
     *any_lobe = vm_any(lobes);
+}
+
+/* What a pixel's lobe reflects of light from -w (unit), and what its interface lets through to the diffuse part. */
+VINL void reflect_light(const es_shade_batch* batch, uint32_t i, vf wx, vf wy, vf wz, vf* pass, vf lobe[3])
+{
+    const es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)}, .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
+    const vf n[3] = {vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i)}, l[3] = {vf_neg(wx), vf_neg(wy), vf_neg(wz)}, v[3] = {vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i)};
+    es_surface_parts_v(&surface, n[0], n[1], n[2], l[0], l[1], l[2], v[0], v[1], v[2], pass, lobe);
+    if (!batch->edited[i / VW]) return;
+    const vf e[3] = {vf_load(batch->turned[0] + i), vf_load(batch->turned[1] + i), vf_load(batch->turned[2] + i)};
+    es_edited_lobe_v(&surface, n, l, v, e, lobe);
 }
 
 /* The share of light from `-d` (unit times r) that screen space leaves of what the map lets through. `cosine`: at the pixel. */
@@ -215,11 +242,8 @@ VINL void apply_light(const es_shade_job* job, const es_shade_light* light, cons
         }
         vf pass = one;
         if (lobed) {
-            es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
-                .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
             vf lobe[3];
-            es_surface_parts_v(&surface, vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i), vf_neg(wx), vf_neg(wy), vf_neg(wz),
-                vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i), &pass, lobe);
+            reflect_light(batch, i, wx, wy, wz, &pass, lobe);
             for (int k = 0; k < 3; k++) vf_store(batch->s[k] + i, vf_load(batch->s[k] + i) + vf_and(lit, g * sent[k] * lobe[k]));
         }
         for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_load(batch->e[k] + i) + vf_and(lit, g * sent[k] * pass));
@@ -329,11 +353,8 @@ VINL void apply_parallel(const es_shade_job* job, const es_shade_light* light, c
         vf pass = one;
         if (lobes && batch->lobed[i / VW]) {
             if (!vm_any(lit)) continue;
-            es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
-                .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
             vf lobe[3];
-            es_surface_parts_v(&surface, vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i), vf_neg(nx), vf_neg(ny), vf_neg(nz),
-                vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i), &pass, lobe);
+            reflect_light(batch, i, nx, ny, nz, &pass, lobe);
             for (int k = 0; k < 3; k++) vf_store(batch->s[k] + i, vf_load(batch->s[k] + i) + vf_and(lit, g * sent[k] * lobe[k]));
             for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_load(batch->e[k] + i) + vf_and(lit, g * sent[k] * pass));
             continue;
@@ -447,10 +468,7 @@ static void apply_chosen(const es_shade_job* job, const es_shade_light* lights, 
             pass = vf_set1(1.0f);
         }
         if (batch->lobed[i / VW]) {
-            es_surface_v surface = {.specular = {vf_load(batch->f0[0] + i), vf_load(batch->f0[1] + i), vf_load(batch->f0[2] + i)},
-                .roughness = vf_load(batch->roughness + i), .model = vi_load(batch->model + i)};
-            es_surface_parts_v(&surface, vf_load(batch->nx + i), vf_load(batch->ny + i), vf_load(batch->nz + i), vf_neg(w[0]), vf_neg(w[1]), vf_neg(w[2]),
-                vf_load(batch->vx + i), vf_load(batch->vy + i), vf_load(batch->vz + i), &pass, lobe);
+            reflect_light(batch, i, w[0], w[1], w[2], &pass, lobe);
             for (int k = 0; k < 3; k++) vf_store(batch->s[k] + i, vf_and(lit, share * sent[k] * lobe[k]));
         }
         for (int k = 0; k < 3; k++) vf_store(batch->e[k] + i, vf_and(lit, share * sent[k] * pass));

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "gi/lit.h"
+#include "gi/micro/gather.h"
 #include "gi/surface.h"
 #include "platform/random.h"
 #include "raster/pack.h"
@@ -54,6 +55,23 @@ static void put(float to[3], es_vec3 from)
     to[2] = from.z;
 }
 
+/* x as the rotation by the shortest arc from `from` to `to` takes it (gi/kernels/edited_lobe_simd.h). */
+static void turn_vector(es_vec3 from, es_vec3 to, float x[3])
+{
+    const es_vec3 sum = es_v3_add(from, to), v = es_v3(x[0], x[1], x[2]);
+    const float a = es_v3_dot(sum, v) / es_maxf(1.0f + es_v3_dot(from, to), 1e-4f), b = 2.0f * es_v3_dot(from, v);
+    const es_vec3 turned = es_v3_add(es_v3_sub(v, es_v3_scale(sum, a)), es_v3_scale(to, b));
+    put(x, es_v3_normalize(turned, v));
+}
+
+static void turn(es_gather_point* point, es_vec3 edited)
+{
+    if (!(es_v3_dot(edited, edited) > 0.0f)) return;
+    const es_vec3 r = es_micro_mirror(point);
+    turn_vector(r, edited, point->normal);
+    turn_vector(r, edited, point->view);
+}
+
 /* Pixel (x, y) of the whole image. */
 static es_gather_point point_of(const es_micro_pixels* p, uint32_t x, uint32_t y, const es_surface* s)
 {
@@ -69,6 +87,7 @@ static es_gather_point point_of(const es_micro_pixels* p, uint32_t x, uint32_t y
     put(point.position, es_pixel_rays_position(&p->rays, fx, fy, g->depth[at]));
     put(point.normal, n);
     put(point.view, v);
+    if (p->kind == ES_GATHER_LOBE && p->edited[0]) turn(&point, es_v3(p->edited[0][at], p->edited[1][at], p->edited[2][at]));
     put(point.f0, s->specular);
     point.seed = es_random_u32(p->seed, 2 * (y * ES_RASTER_MAX_SIZE + x) + p->kind);
     return point;

@@ -17,6 +17,8 @@ typedef struct es_micro_pixels {
     uint32_t spacing;              /* 1, 2, 4 */
     const uint8_t* listed;         /* with spacing 1: only pixels whose bit is set, x % 8 of byte x / 8 of rows of es_micro_list_stride(); NULL: all */
     uint32_t seed;
+    const float* edited[3];        /* where lobes reflect, rows of gbuffer->stride, (0, 0, 0) where they do as the law says (gi/edit/edit.h): their micro-buffers are drawn
+                                    * in a frame turned by as much (Ritschel thesis §9.2); NULL: everywhere */
     /* out: planes of the smaller image; 0 where nothing is gathered, and without `listed` all of them are written */
     float* result[3];
     uint32_t stride;
