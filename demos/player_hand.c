@@ -4,76 +4,10 @@
  * A light that a clip moves would be back in the next step; so one that is dragged moves to a node of its own, made when the scene was
  * opened (what exists must not change, or the past could not be gone back to). */
 #include "player.h"
+#include "player_eye.h"
 
 #include <math.h>
 #include <string.h>
-
-/* ---- between the picture and the world ------------------------------------------------------------------------------------------------ */
-
-typedef struct eye {
-    es_raster_view view;
-    double origin[3];
-    float width, height;
-} eye;
-
-static bool look(const player* p, eye* e)
-{
-    if (!p->canvas.width || !p->canvas.height) return false;
-    e->width = (float)p->canvas.width;
-    e->height = (float)p->canvas.height;
-    es_world_origin(p->session.world, e->origin);
-    return es_world_camera_view(p->session.world, es_world_active_camera(p->session.world), p->canvas.width, p->canvas.height, &e->view) == ES_OK;
-}
-
-/* x to the right, y up, z towards us. */
-static es_vec3 to_eye(const eye* e, const double position[3])
-{
-    const float* m = e->view.view.m;
-    float x = (float)(position[0] - e->origin[0]), y = (float)(position[1] - e->origin[1]), z = (float)(position[2] - e->origin[2]);
-    return (es_vec3){m[0] * x + m[4] * y + m[8] * z + m[12], m[1] * x + m[5] * y + m[9] * z + m[13], m[2] * x + m[6] * y + m[10] * z + m[14]};
-}
-
-static void to_world(const eye* e, es_vec3 v, double position[3])
-{
-    const float* m = e->view.view.m;
-    float x = v.x - m[12], y = v.y - m[13], z = v.z - m[14];
-    position[0] = e->origin[0] + (double)(m[0] * x + m[1] * y + m[2] * z);
-    position[1] = e->origin[1] + (double)(m[4] * x + m[5] * y + m[6] * z);
-    position[2] = e->origin[2] + (double)(m[8] * x + m[9] * y + m[10] * z);
-}
-
-/* False behind the eye. */
-static bool to_pixel(const eye* e, es_vec3 v, float* x, float* y)
-{
-    const float* m = e->view.projection.m;
-    float w = m[3] * v.x + m[7] * v.y + m[11] * v.z + m[15];
-    if (!(w > 1e-6f)) return false;
-    *x = ((m[0] * v.x + m[4] * v.y + m[8] * v.z + m[12]) / w * 0.5f + 0.5f) * e->width;
-    *y = (0.5f - (m[1] * v.x + m[5] * v.y + m[9] * v.z + m[13]) / w * 0.5f) * e->height;
-    return true;
-}
-
-/* Where the pixel's ray is `distance` ahead of the eye. */
-static es_vec3 from_pixel(const eye* e, float x, float y, float distance)
-{
-    const float* m = e->view.projection.m;
-    float w = m[11] * -distance + m[15]; /* perspective: the distance; orthographic: 1 */
-    float nx = (2 * x / e->width - 1) * w, ny = (1 - 2 * y / e->height) * w;
-    return (es_vec3){(nx + m[8] * distance - m[12]) / m[0], (ny + m[9] * distance - m[13]) / m[5], -distance};
-}
-
-/* The pixel's ray in the world; what is orthographic begins beside the eye. */
-static void pixel_ray(const eye* e, float x, float y, double origin[3], es_vec3* direction)
-{
-    double far[3];
-    bool parallel = e->view.projection.m[11] == 0;
-    to_world(e, parallel ? from_pixel(e, x, y, 0) : (es_vec3){0, 0, 0}, origin);
-    to_world(e, from_pixel(e, x, y, 1), far);
-    float d[3], length = 0;
-    for (int k = 0; k < 3; k++) d[k] = (float)(far[k] - origin[k]), length += d[k] * d[k];
-    length = sqrtf(length);
-    *direction = length > 0 ? (es_vec3){d[0] / length, d[1] / length, d[2] / length} : (es_vec3){0, 0, -1};
-}
 
 /* ---- lights ------------------------------------------------------------------------------------------------------------------------------- */
 
@@ -123,11 +57,11 @@ static int index_of(const player* p, es_light light)
 static void hold_light(player* p, es_light light, bool by_keyboard)
 {
     player_hand* h = &p->hand;
-    eye e;
+    player_eye e;
     es_light_desc desc;
     double position[3];
     int index = index_of(p, light);
-    if (index < 0 || !look(p, &e) || !light_position(p, light, position) || es_world_get_light(p->session.world, light, &desc) != ES_OK) return;
+    if (index < 0 || !player_look(p, &e) || !light_position(p, light, position) || es_world_get_light(p->session.world, light, &desc) != ES_OK) return;
     es_node own = p->nodes.lights[index].own;
     if (desc.node.id != own.id) {
         es_mat4 pose;
@@ -144,7 +78,7 @@ static void hold_light(player* p, es_light light, bool by_keyboard)
     h->by_keyboard = by_keyboard;
     h->light = light;
     memcpy(h->target, position, sizeof h->target);
-    h->distance = -to_eye(&e, position).z;
+    h->distance = -eye_of_world(&e, position).z;
     h->show_lights = true;
 }
 
@@ -201,13 +135,13 @@ static bool held_point(const player* p, double point[3])
     return true;
 }
 
-static void hold(player* p, player_held what, const eye* e, const double point[3], bool by_keyboard)
+static void hold(player* p, player_held what, const player_eye* e, const double point[3], bool by_keyboard)
 {
     player_hand* h = &p->hand;
     h->what = what;
     h->by_keyboard = by_keyboard;
     memcpy(h->target, point, sizeof h->target);
-    h->distance = -to_eye(e, point).z;
+    h->distance = -eye_of_world(e, point).z;
 }
 
 /* How far ahead of the eye what the pixel shows is; 0: nothing is there. */
@@ -244,21 +178,21 @@ static bool movable_at(player* p, const double point[3], float radius, es_body* 
 static bool grab_at(player* p, float x, float y, bool by_keyboard)
 {
     es_world* world = p->session.world;
-    eye e;
+    player_eye e;
     double origin[3], point[3];
     es_vec3 direction;
     es_soft_contact soft = {0};
     es_body body;
     es_body_state state;
     float seen = seen_at(p, x, y);
-    if (!(seen > 0) || !look(p, &e)) return false;
-    pixel_ray(&e, x, y, origin, &direction);
-    if (es_world_soft_pick(world, origin, direction, reach, &soft) == ES_OK && soft.soft.id && -to_eye(&e, soft.point).z <= seen * 1.02f + 0.02f) {
+    if (!(seen > 0) || !player_look(p, &e)) return false;
+    eye_pixel_ray(&e, x, y, origin, &direction);
+    if (es_world_soft_pick(world, origin, direction, reach, &soft) == ES_OK && soft.soft.id && -eye_of_world(&e, soft.point).z <= seen * 1.02f + 0.02f) {
         if (es_world_grab_soft(world, HAND, soft.soft, soft.vertex, soft.point) != ES_OK) return false;
         hold(p, HELD_SOFT, &e, soft.point, by_keyboard);
         return true;
     }
-    to_world(&e, from_pixel(&e, x, y, seen), point);
+    world_of_eye(&e, eye_of_pixel(&e, x, y, seen), point);
     if (!movable_at(p, point, 0.004f * seen, &body, &state)) return false;
     es_vec3 arm = {(float)(point[0] - state.position[0]), (float)(point[1] - state.position[1]), (float)(point[2] - state.position[2])};
     es_quat back = {-state.rotation.x, -state.rotation.y, -state.rotation.z, state.rotation.w};
@@ -286,24 +220,24 @@ void player_grab(player* p)
 /* Away from the eye, at a speed that crosses the scene in a second. */
 void player_throw(player* p)
 {
-    eye e;
+    player_eye e;
     double origin[3];
     es_vec3 direction;
     es_hand_state hand;
-    if (p->hand.what != HELD_BODY || !look(p, &e) || es_world_get_hand(p->session.world, HAND, &hand) != ES_OK) return;
+    if (p->hand.what != HELD_BODY || !player_look(p, &e) || es_world_get_hand(p->session.world, HAND, &hand) != ES_OK) return;
     player_release(p);
-    pixel_ray(&e, e.width / 2, e.height / 2, origin, &direction);
+    eye_pixel_ray(&e, e.width / 2, e.height / 2, origin, &direction);
     float speed = 6 * p->nodes.fly.speed;
     es_world_set_body_velocity(p->session.world, hand.body, (es_vec3){direction.x * speed, direction.y * speed, direction.z * speed}, (es_vec3){0, 0, 0});
 }
 
 static bool pick_soft(player* p, float x, float y, es_soft_contact* contact)
 {
-    eye e;
+    player_eye e;
     double origin[3];
     es_vec3 direction;
-    if (!look(p, &e)) return false;
-    pixel_ray(&e, x, y, origin, &direction);
+    if (!player_look(p, &e)) return false;
+    eye_pixel_ray(&e, x, y, origin, &direction);
     return es_world_soft_pick(p->session.world, origin, direction, reach, contact) == ES_OK && contact->soft.id;
 }
 
@@ -343,14 +277,14 @@ enum { GRASP = 14 }; /* pixels of the font from a light's mark that still take i
 static bool take_light_at(player* p, float x, float y)
 {
     player_hand* h = &p->hand;
-    eye e;
-    if (!h->show_lights || !look(p, &e)) return false;
+    player_eye e;
+    if (!h->show_lights || !player_look(p, &e)) return false;
     int nearest = -1;
     float best = (float)(GRASP * p->ui.scale);
     for (size_t i = 0; i < p->nodes.light_count; i++) {
         double position[3];
         float px, py;
-        if (!light_position(p, p->nodes.lights[i].light, position) || !to_pixel(&e, to_eye(&e, position), &px, &py)) continue;
+        if (!light_position(p, p->nodes.lights[i].light, position) || !eye_to_pixel(&e, eye_of_world(&e, position), &px, &py)) continue;
         float away = hypotf(px - x, py - y);
         if (away < best) best = away, nearest = (int)i;
     }
@@ -358,16 +292,16 @@ static bool take_light_at(player* p, float x, float y)
     return nearest >= 0;
 }
 
-static void move_by_keys(player* p, const eye* e, const es_window_input* input)
+static void move_by_keys(player* p, const player_eye* e, const es_window_input* input)
 {
     player_hand* h = &p->hand;
     float right = (float)input->down[ES_KEY_RIGHT] - (float)input->down[ES_KEY_LEFT], up = (float)input->down[ES_KEY_UP] - (float)input->down[ES_KEY_DOWN];
     float away = (float)input->down[ES_KEY_PAGE_UP] - (float)input->down[ES_KEY_PAGE_DOWN];
     if (right == 0 && up == 0 && away == 0) return;
     float step = p->nodes.fly.speed * p->seconds * (input->down[ES_KEY_SHIFT] ? 4.0f : 1.0f);
-    es_vec3 place = to_eye(e, h->target);
+    es_vec3 place = eye_of_world(e, h->target);
     place = (es_vec3){place.x + right * step, place.y + up * step, place.z - away * step};
-    to_world(e, place, h->target);
+    world_of_eye(e, place, h->target);
 }
 
 /* What is held may be gone: torn, or the scene rewound. */
@@ -386,23 +320,23 @@ static void move_hand(player* p)
 bool player_hand_update(player* p, const es_window_input* input)
 {
     player_hand* h = &p->hand;
-    eye e;
+    player_eye e;
     bool had = h->what != HELD_NOTHING && !h->by_keyboard;
     if (h->what == HELD_NOTHING || h->by_keyboard)
         if (input->mouse_pressed[0] && (take_light_at(p, input->press_x[0], input->press_y[0]) || grab_at(p, input->press_x[0], input->press_y[0], false))) had = true;
     if (input->mouse_pressed[2]) tear_at(p, input->press_x[2], input->press_y[2]);
-    if (h->what == HELD_NOTHING || !look(p, &e)) return false;
+    if (h->what == HELD_NOTHING || !player_look(p, &e)) return false;
     if (input->scroll != 0) {
-        es_vec3 place = to_eye(&e, h->target);
+        es_vec3 place = eye_of_world(&e, h->target);
         float grown = powf(1.1f, input->scroll);
         h->distance *= grown;
-        if (h->by_keyboard) to_world(&e, (es_vec3){place.x, place.y, place.z * grown}, h->target);
+        if (h->by_keyboard) world_of_eye(&e, (es_vec3){place.x, place.y, place.z * grown}, h->target);
     }
     if (h->by_keyboard) {
         move_by_keys(p, &e, input);
         return false;
     }
-    if (had && (input->mouse_dx != 0 || input->mouse_dy != 0 || input->scroll != 0)) to_world(&e, from_pixel(&e, input->mouse_x, input->mouse_y, h->distance), h->target);
+    if (had && (input->mouse_dx != 0 || input->mouse_dy != 0 || input->scroll != 0)) world_of_eye(&e, eye_of_pixel(&e, input->mouse_x, input->mouse_y, h->distance), h->target);
     if (!input->mouse_down[0]) {
         move_hand(p); /* the last of the way before it lets go */
         player_release(p);
@@ -430,12 +364,12 @@ int player_hand_apply(player* p)
 }
 
 /* A line from where it is held to where the hand is. */
-static void draw_pull(player* p, const eye* e)
+static void draw_pull(player* p, const player_eye* e)
 {
     double point[3];
     float x0, y0, x1, y1;
     int s = p->ui.scale;
-    if (!held_point(p, point) || !to_pixel(e, to_eye(e, point), &x0, &y0) || !to_pixel(e, to_eye(e, p->hand.target), &x1, &y1)) return;
+    if (!held_point(p, point) || !eye_to_pixel(e, eye_of_world(e, point), &x0, &y0) || !eye_to_pixel(e, eye_of_world(e, p->hand.target), &x1, &y1)) return;
     if (fabsf(x0) + fabsf(y0) + fabsf(x1) + fabsf(y1) > 1e5f) return;
     canvas_line(&p->canvas, (int)x0, (int)y0, (int)x1, (int)y1, s, UI_FOCUS);
     canvas_dot(&p->canvas, (int)x0 - 2 * s, (int)y0 - 2 * s, 5 * s, UI_FOCUS);
@@ -444,8 +378,8 @@ static void draw_pull(player* p, const eye* e)
 void player_hand_draw(player* p)
 {
     player_hand* h = &p->hand;
-    eye e;
-    if (p->hide_all || !look(p, &e)) return;
+    player_eye e;
+    if (p->hide_all || !player_look(p, &e)) return;
     int s = p->ui.scale, cx = (int)p->canvas.width / 2, cy = (int)p->canvas.height / 2;
     if (h->what == HELD_BODY || h->what == HELD_SOFT) draw_pull(p, &e);
     if (demo_seconds() < h->cross_until) {
@@ -456,7 +390,7 @@ void player_hand_draw(player* p)
     for (size_t i = 0; i < p->nodes.light_count; i++) {
         double position[3];
         float x, y;
-        if (!light_position(p, p->nodes.lights[i].light, position) || !to_pixel(&e, to_eye(&e, position), &x, &y)) continue;
+        if (!light_position(p, p->nodes.lights[i].light, position) || !eye_to_pixel(&e, eye_of_world(&e, position), &x, &y)) continue;
         bool held = h->what == HELD_LIGHT && h->light.id == p->nodes.lights[i].light.id;
         canvas_rect mark = {(int)x - 5 * s, (int)y - 5 * s, 11 * s, 11 * s};
         canvas_blend(&p->canvas, mark, 0, 128);
