@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/edit/edit_pass.h"
 #include "gi/lit.h"
 #include "gi/near_light.h"
 #include "gi/screen/residual_pass.h"
@@ -64,7 +65,8 @@ float es_vpl_spread(const es_renderer_settings* s) { return !es_residual_nothing
 
 /* ---- shading ---------------------------------------------------------------------------------------------------------------- */
 
-static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, bool repair, es_planes* irradiance, es_planes* specular)
+/* picture: what belongs to its pixels (edited reflections, repaired shadows) counts */
+static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, bool picture, es_planes* irradiance, es_planes* specular)
 {
     const es_renderer_settings* s = &r->frame.settings;
     const float extent = r->frame.extent, near = near_distance_of(r);
@@ -80,7 +82,12 @@ static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t light
         job.specular[k] = of->lobes ? specular->at[k] : NULL;
     }
     job.lit = of->lobes ? specular->lit : NULL;
-    if (repair) {
+    if (picture) {
+        es_edited_reflections(r, job.edited);
+        job.edited_stride = r->gbuffer.stride;
+        job.edited_spacing = s->half_resolution ? 2 : 1;
+    }
+    if (picture && s->screen_repair) {
         job.repair = &r->screen.stack.views[0];
         job.repair_samples = s->screen_repair;
         job.repair_most = s->screen_radius * extent;
@@ -114,7 +121,7 @@ static es_lit_surfaces picture_of(const es_renderer* r)
 es_result es_indirect_shade(es_renderer* r, uint32_t lights, es_planes* irradiance, es_planes* specular)
 {
     const es_lit_surfaces picture = picture_of(r);
-    return shade(r, &picture, lights, r->frame.settings.screen_repair != 0, irradiance, specular);
+    return shade(r, &picture, lights, true, irradiance, specular);
 }
 
 es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
@@ -137,6 +144,7 @@ es_result es_pass_shading(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_CLASSIC);
     es_plan_reads_pass(plan, ES_PASS_HIERARCHY);
     es_plan_reads_pass(plan, ES_PASS_BOUNCES);
+    es_plan_reads_pass(plan, ES_PASS_EDITS);
     if (s->screen_repair) es_plan_reads_pass(plan, ES_PASS_SCREEN_VIEWS);
     const bool sampled = s->method == ES_GI_VPL_SAMPLED, unbounded = s->traced_bias == ES_TRACED_UNBOUNDED;
     const uint32_t interleave = interleave_of(s);

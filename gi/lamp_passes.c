@@ -1,5 +1,6 @@
 #include "gi/lamp_passes.h"
 
+#include "gi/edit/edit_pass.h"
 #include "gi/filter.h"
 #include "gi/indirect.h"
 #include "gi/passes.h"
@@ -92,7 +93,8 @@ es_shade_job es_lamps_at_points(const es_renderer* r)
 
 static uint32_t shaded_count(const es_renderer* r) { return sky_in_screen_space(r) ? r->lamps.set.glowing : r->lamps.set.shaded_count; }
 
-static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, bool repair, es_planes* irradiance, es_planes* specular)
+/* picture: what belongs to its pixels (edited reflections, repaired shadows) counts */
+static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t lights, bool picture, es_planes* irradiance, es_planes* specular)
 {
     const es_renderer_settings* s = &r->frame.settings;
     const es_lamp_light* lamps = &r->lamps;
@@ -114,7 +116,12 @@ static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t light
         job.specular[k] = of->lobes ? specular->at[k] : NULL;
     }
     job.lit = of->lobes ? specular->lit : NULL;
-    if (repair) {
+    if (picture) {
+        es_edited_reflections(r, job.edited);
+        job.edited_stride = r->gbuffer.stride;
+        job.edited_spacing = 1;
+    }
+    if (picture && s->screen_repair) {
         job.repair = &r->screen.stack.views[0];
         job.repair_samples = s->screen_repair;
         job.repair_most = s->screen_radius * r->frame.extent;
@@ -198,14 +205,14 @@ es_result es_pass_lamp_light(es_renderer* r, const es_frame_inputs* in)
     }
     r->lamps.has_specular = es_lamps_anything_specular(in->solid);
     es_plan_begin(plan, ES_PASS_LAMP_LIGHT);
-    const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY};
+    const es_pass read[] = {ES_PASS_VISIBILITY, ES_PASS_LAMPS, ES_PASS_LAMP_MAPS, ES_PASS_HIERARCHY, ES_PASS_EDITS};
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
     if (s->screen_repair) es_plan_reads_pass(plan, ES_PASS_SCREEN_VIEWS);
     const float numbers[] = {s->lamp_slope_bias, s->lamp_roughness, (float)s->lamp_interleave, in->extent, r->lamps.has_specular, (float)s->lamps, (float)s->screen_repair, s->screen_radius};
     es_plan_reads(plan, numbers, sizeof numbers);
     if (es_plan_run(plan, ES_PASS_LAMP_LIGHT)) {
         const es_lit_surfaces picture = picture_of(r);
-        es_result result = shade(r, &picture, shaded_count(r), s->screen_repair != 0, &r->lamps.irradiance, &r->lamps.specular);
+        es_result result = shade(r, &picture, shaded_count(r), true, &r->lamps.irradiance, &r->lamps.specular);
         if (result) return result;
         es_plan_done(plan, ES_PASS_LAMP_LIGHT, (uint64_t)r->gbuffer.width * r->gbuffer.height * shaded_count(r) / (s->lamp_interleave * s->lamp_interleave));
     }

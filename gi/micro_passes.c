@@ -4,6 +4,7 @@
 
 #include "gi/blend_passes.h"
 #include "gi/bounce_pass.h"
+#include "gi/edit/edit_pass.h"
 #include "gi/indirect.h"
 #include "gi/lamp_passes.h"
 #include "gi/lit.h"
@@ -180,7 +181,9 @@ static bool accumulates(const es_renderer* r) { return r->settings.temporal && r
 
 static es_micro_pixels pixels_of(const es_renderer* r, uint32_t kind)
 {
-    return (es_micro_pixels){.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(r->micro.turn) + r->frame.settings.seed};
+    es_micro_pixels pixels = {.gbuffer = &r->gbuffer, .rays = r->rays, .kind = kind, .spacing = 1, .seed = es_hash_u32(r->micro.turn) + r->frame.settings.seed};
+    es_edited_reflections(r, pixels.edited);
+    return pixels;
 }
 
 bool es_micro_point_of_frame(const es_renderer* renderer, uint32_t x, uint32_t y, uint32_t kind, es_gather_point* point)
@@ -332,6 +335,7 @@ es_result es_pass_micro(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_MICRO);
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_POINT_LIGHT);
+    es_plan_reads_pass(plan, ES_PASS_EDITS);
     es_plan_reads(plan, &r->micro.forest.version, sizeof r->micro.forest.version);
     const uint32_t words[] = {s->micro_size, s->micro_spacing, s->micro_ray_cast, s->micro_warp, s->micro_nodes, r->has_specular, s->seed, r->micro.turn, several};
     es_plan_reads(plan, words, sizeof words);

@@ -10,6 +10,7 @@
 
 #define ES_PASSES(X)                                                                                             \
     X(VISIBILITY, "visibility", "triangles")                                                                     \
+    X(EDITS, "reflection edits", "pixels")                                                                       \
     X(BACKGROUND, "background", "pixels")                                                                        \
     X(ENVIRONMENT, "environment", "texels")                                                                      \
     X(SHADOW_MAPS, "shadow maps", "triangles")                                                                   \

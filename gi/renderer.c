@@ -7,6 +7,7 @@
 #include "gi/bounce_pass.h"
 #include "gi/classic.h"
 #include "gi/direct.h"
+#include "gi/edit/edit_pass.h"
 #include "gi/indirect.h"
 #include "gi/lamp_passes.h"
 #include "gi/lit.h"
@@ -115,6 +116,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_residual_buffers_free(context, &renderer->residual);
     es_second_order_free(context, &renderer->second_order);
     es_history_free(context, &renderer->history);
+    es_edit_buffers_free(context, &renderer->edits);
     es_micro_free_planes(context, &renderer->micro);
     es_lamps_free_planes(context, &renderer->lamps);
     es_planes_free(context, &renderer->filtered_irradiance);
@@ -481,6 +483,7 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads_pass(plan, ES_PASS_VISIBILITY);
     es_plan_reads_pass(plan, ES_PASS_SHADOW_MAPS);
     if (r->settings.screen_repair) es_plan_reads_pass(plan, ES_PASS_SCREEN_VIEWS);
+    es_plan_reads_pass(plan, ES_PASS_EDITS);
     es_plan_reads(plan, in->lights, in->light_count * sizeof *in->lights);
     float numbers[] = {(float)r->settings.shadow_filter, r->settings.shadow_bias, r->settings.shadow_slope_bias, (float)r->settings.screen_repair, r->settings.screen_repair_least * in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);
@@ -489,6 +492,7 @@ static es_result pass_direct(es_renderer* r, const es_frame_inputs* in)
         es_direct_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .view = &r->light_views[i], .shadow_filter = r->settings.shadow_filter, .shadow_bias = r->settings.shadow_bias,
             .shadow_slope_bias = r->settings.shadow_slope_bias, .repair = r->settings.screen_repair ? &r->screen.stack.views[0] : NULL, .repair_samples = r->settings.screen_repair,
             .repair_least = r->settings.screen_repair_least * in->extent, .first = i == 0, .out = {r->direct.at[0], r->direct.at[1], r->direct.at[2]}};
+        es_edited_reflections(r, job.edited);
         es_direct_light(r->context, &job);
     }
     es_plan_done(plan, ES_PASS_DIRECT, r->light_count);
@@ -616,6 +620,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     es_antialias_aim(r, picture);
     r->rays = es_pixel_rays_of_view(&r->view);
     es_result result = pass_visibility(r, in);
+    if (!result) result = es_pass_edits(r, in, world);
     if (!result) result = es_pass_background(r, in);
     if (!result) result = es_pass_environment(r, in);
     if (!result) result = es_pass_screen_views(r, in);

@@ -70,6 +70,9 @@ typedef struct es_residual_buffers {
     es_planes steps[ES_RESIDUAL_STEPS]; /* reflected radiance */
 } es_residual_buffers;
 
+/* Where edited reflections go (gi/edit/edit_pass.h). */
+typedef struct es_edit_buffers { es_planes directions; } es_edit_buffers;
+
 struct es_renderer {
     es_context* context;
     es_renderer_settings settings;
@@ -100,6 +103,7 @@ struct es_renderer {
     es_surfels surfels;        /* of these or of `points` */
     es_ism_maps maps;          /* imperfect or classic, whichever the method uses */
 
+    es_edit_buffers edits;
     es_lamp_light lamps;
     es_trace_scene trace_scene; /* of traced methods */
     es_micro_buffers micro;

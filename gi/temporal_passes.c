@@ -95,7 +95,7 @@ es_result es_history_begin(es_renderer* r, const es_frame_inputs* in, const es_w
 
     uint64_t content = es_hash_bytes(settings, &r->view.view, sizeof r->view.view);
     content = es_hash_bytes(content, &r->view.projection, sizeof r->view.projection);
-    const uint64_t words[] = {now->geometry, now->materials, now->lights};
+    const uint64_t words[] = {now->geometry, now->materials, now->lights, now->edits};
     content = es_hash_bytes(content, words, sizeof words);
     content = es_hash_bytes(content, &s->exposure, sizeof s->exposure);
     h->still = h->continuous && !h->moving && content == h->content ? h->still + (h->still < UINT32_MAX) : 0;
