@@ -160,6 +160,18 @@ typedef struct es_renderer_settings {
     float exposure_adapt;            /* s that the exposure takes to get used to a brighter picture, four times that to a darker one (gi/exposure.h); the first picture is what it is
                                       * used to. Goes by the world's time. 0: the exposure is what `exposure` says, otherwise that is added to it */
     float exposure_key;              /* exposure_adapt: radiance times exposure that the picture's logarithmic mean is shown as */
+    /* glare: the eye that looks at the picture (Ritschel thesis §8.2, table 8.1; gi/glare/eye.h). Parts that are off scatter nothing, what has a strength of 0 stays still */
+    uint32_t glare_seed;             /* of the subject's anatomy, and of what moves it */
+    float glare_pupil;               /* mean diameter, mm; below 0: by the field's luminance (eq. 8.2) */
+    float glare_hippus;              /* amplitude of the noise by which it fluctuates (eq. 8.1) */
+    bool glare_cornea;               /* large particles that do not move */
+    bool glare_lens, glare_gratings; /* particles of the lens, and fibres of its cortex … */
+    float glare_accommodation;       /* … which the muscle's fluctuations move, so many times as far as usual */
+    bool glare_vitreous;             /* particles of the vitreous humour … */
+    float glare_saccades;            /* … which the eye's jumps turn, likewise */
+    bool glare_lids, glare_lashes;   /* lashes, blinking and squinting want lids */
+    bool glare_blink;
+    float glare_squint;              /* 1: as usual, from a field luminance of 300 cd/m² on; 0: not */
     /* several bounces */
     uint32_t bounces;                /* 0: none; 1: one indirect bounce; … ES_MAX_BOUNCES */
     uint32_t bounce_method;          /* es_bounce_method */

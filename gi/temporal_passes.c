@@ -16,6 +16,7 @@ uint64_t es_history_settings(const es_renderer_settings* settings)
     for (size_t i = 0; i < es_renderer_setting_count(); i++) {
         const es_setting* setting = es_renderer_setting(i);
         bool counts = true;
+        counts &= strncmp(setting->name, "glare", 5) != 0; /* done to the finished picture */
         for (size_t k = 0; k < sizeof others / sizeof *others; k++) counts &= strcmp(setting->name, others[k]) != 0;
         const char* value = (const char*)settings + setting->offset;
         if (counts) hash = es_hash_bytes(hash, value, setting->type == ES_SETTING_BOOL ? sizeof(bool) : sizeof(uint32_t));

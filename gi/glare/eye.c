@@ -14,9 +14,10 @@ static const float field_seconds = 0.5f; /* towards brighter; the pupil itself t
 typedef enum part { CORNEA = 1, LENS, VITREOUS, LASHES, BLINK, SACCADES, HIPPUS, ACCOMMODATION } part;
 static uint32_t seed_of(const es_eye* eye, part p) { return es_hash_u32(eye->subject.seed * 16 + (uint32_t)p); }
 
-es_eye_subject es_default_eye_subject(void)
+es_eye_subject es_eye_subject_of(const es_renderer_settings* s)
 {
-    return (es_eye_subject){.pupil = -1, .hippus = 0.125f, .accommodation = 1, .saccades = 1, .squint = 1, .cornea = true, .lens = true, .gratings = true, .vitreous = true, .lids = true, .lashes = true, .blink = true};
+    return (es_eye_subject){.seed = s->glare_seed, .pupil = s->glare_pupil, .hippus = s->glare_hippus, .accommodation = s->glare_accommodation, .saccades = s->glare_saccades, .squint = s->glare_squint,
+        .cornea = s->glare_cornea, .lens = s->glare_lens, .gratings = s->glare_gratings, .vitreous = s->glare_vitreous, .lids = s->glare_lids, .lashes = s->glare_lashes, .blink = s->glare_blink};
 }
 
 /* Flat cells: static, large, and few and far between (§8.2.1), uniform over the widest pupil. */

@@ -6,6 +6,7 @@
 #ifndef EARTHSHINE_GI_GLARE_EYE_H
 #define EARTHSHINE_GI_GLARE_EYE_H
 
+#include "gi/gi.h"
 #include "gi/glare/adaptation.h"
 #include "gi/glare/eye_shapes.h"
 #include "gi/glare/lens.h"
@@ -13,7 +14,7 @@
 #include "gi/glare/step_grid.h"
 #include "gi/glare/vitreous.h"
 
-enum { ES_CORNEA_PARTICLES = 340 };
+enum { ES_CORNEA_PARTICLES = 290 };
 
 /* Every strength may be 0, every part off. */
 typedef struct es_eye_subject {
@@ -37,7 +38,7 @@ typedef struct es_eye {
     es_lids lids;
 } es_eye;
 
-es_eye_subject es_default_eye_subject(void);
+es_eye_subject es_eye_subject_of(const es_renderer_settings* settings); /* glare.* */
 /* Brings the eye to `time`, in seconds of the world, while it looks at a picture of a mean luminance in cd/m² (anything, NaN included). Another subject than
  * before is another eye. */
 void es_eye_advance(es_eye* eye, const es_eye_subject* subject, double time, float luminance);

@@ -8,7 +8,7 @@
 
 enum { SACCADE_SLOT = 7 * ES_GRID_RATE / 10 }; /* steps, one saccade somewhere in each */
 /* Back to rest in about a second: a spring of 0.6 Hz, critically damped. */
-static const float spring = 14.2f, damping = 7.5f, fading = 1.0f / 0.05f; /* 1/s², 1/s, 1/s */
+static const float spring = 14.2f, damping = 7.6f, fading = 1.0f / 0.05f; /* 1/s², 1/s, 1/s */
 
 void es_vitreous_begin(es_vitreous* v, uint32_t seed)
 {
