@@ -438,6 +438,14 @@ ES_API es_vec3 es_offset_origin(es_vec3 point, es_vec3 geometric_normal);
  * For benchmarks. INVALID_ARGUMENT for sizes other than products of 2, 3 and 5 up to 16384, of the width multiples of 64. */
 ES_API es_result es_fft_measure(es_context* context, uint32_t width, uint32_t height, bool real, uint32_t times, double* milliseconds);
 
+/* ---- diffraction ------------------------------------------------------------------------------------------------------------------------ */
+
+/* Where light goes that passes an aperture, as the glare of pictures has it (`glare` of es_renderer_settings): `transmittance` is square, of one channel 0 … 1,
+ * `width` metres wide, its size a multiple of 64 without prime factors but 2, 3 and 5, 64 … 4096. `power` has the same size and sums to 1; pixel
+ * (size / 2 + k, size / 2 + l) is light of 575 nm that goes (k, l) · 575 nm / width radians aside. `defocus` in dioptres, 0: Fraunhofer's diffraction, otherwise
+ * Fresnel's. The caller destroys `power`. INVALID_ARGUMENT otherwise. */
+ES_API es_result es_diffraction_image(es_context* context, const es_image* transmittance, float width, float defocus, es_image* power);
+
 /* ---- error: how far a picture is from the truth ------------------------------------------------------------------------------------ */
 
 /* Of a picture A against a reference B, over all pixels and the channels compared, with d = A - B. Deterministic: own elementary

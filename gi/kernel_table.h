@@ -14,6 +14,9 @@
 #include "gi/fft.h"
 #include "gi/filter.h"
 #include "gi/gi.h"
+#include "gi/glare/billboards.h"
+#include "gi/glare/convolution.h"
+#include "gi/glare/diffraction.h"
 #include "gi/half_resolution.h"
 #include "gi/meter.h"
 #include "gi/micro/forest_parts.h"
@@ -80,6 +83,14 @@
     /* gi/fft.h: strips of columns, rows; scratch of es_fft_column_scratch or es_fft_row_scratch floats, 64-byte aligned */ \
     X(fft_columns, (const es_fft_columns_job* job, uint32_t begin, uint32_t end, float* scratch))                \
     X(fft_rows, (const es_fft_rows_job* job, uint32_t begin, uint32_t end, float* scratch))                      \
+    /* gi/glare/diffraction.h: groups of eight rows of the spectrum; scratch of es_chromatic_scratch floats */     \
+    X(chromatic, (const es_chromatic_job* job, uint32_t begin, uint32_t end, float* scratch))                    \
+    /* gi/glare/convolution.h: rows, and whether each strip of their columns is dark; rows */                    \
+    X(glare_load, (const es_glare_load_job* job, uint32_t row_begin, uint32_t row_end, uint8_t* dark))           \
+    X(glare_finish, (const es_glare_finish_job* job, uint32_t row_begin, uint32_t row_end))                      \
+    /* gi/glare/billboards.h: rows of tiles; rows */                                                             \
+    X(billboard_tiles, (const es_glare_billboard_job* job, uint32_t begin, uint32_t end))                        \
+    X(billboard_rows, (const es_glare_billboard_job* job, uint32_t row_begin, uint32_t row_end))                 \
     X(trace_closest, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, es_hit* hits))       \
     X(trace_any, (const es_bvh* bvh, bool coherent, const es_ray* rays, uint32_t count, uint8_t* blocked))       \
     X(trace_beyond, (const es_bvh* bvh, const es_ray* ray, const es_hit* passed, es_hit* hit))                   \

@@ -1,0 +1,61 @@
+/* Colours of a power spectrum, as pixels of a picture (gi/glare/diffraction.h).
+ *
+ * Eight rows of pixels together: for each wavelength the samples of a column are summed for each of the rows, transposed so that lanes are rows, and then
+ * summed along these. Values: finite, not negative. */
+#include "gi/glare/diffraction.h"
+#include "gi/kernel_table.h"
+#include "platform/simd.h"
+
+/* Columns of the power spectrum, summed for rows first … first + 7 of the pixels: lanes are rows. */
+VINL void sum_columns(const es_chromatic_job* job, const es_spectral_band* band, uint32_t first, uint32_t end, float* to)
+{
+    for (uint32_t x = job->column_begin; x < job->column_end; x += VW) {
+        vf rows[VW];
+        for (uint32_t i = 0; i < VW; i++) {
+            vf sum = vf_zero();
+            const uint32_t row = first + i, count = row < end ? band->count[row] : 0;
+            if (count) {
+                const float *weights = band->weights + (size_t)row * band->most, *from = job->power + band->first[row] * job->power_stride + x;
+                for (uint32_t t = 0; t < count; t++) sum = sum + vf_load(from + t * job->power_stride) * vf_set1(weights[t]);
+            }
+            rows[i] = sum;
+        }
+        vf_transpose8(rows);
+        for (uint32_t i = 0; i < VW; i++) vf_store(to + (size_t)(x + i) * VW, rows[i]);
+    }
+}
+
+void ES_KERNEL(es_gi_chromatic)(const es_chromatic_job* job, uint32_t begin, uint32_t end, float* scratch)
+{
+    const es_chromatic_blur* blur = job->blur;
+    const uint32_t columns = 2 * blur->reach_x + 1, column_offset = blur->reach - blur->reach_x, row_offset = blur->reach - blur->reach_y, row_end = row_offset + 2 * blur->reach_y + 1;
+    float *lines = scratch, *sums = scratch + (size_t)VW * blur->size;
+    const size_t plane = VW * job->stride;
+    for (uint32_t group = begin; group < end; group++) {
+        for (size_t i = 0; i < 3 * plane; i += VW) vf_store(sums + i, vf_zero());
+        for (uint32_t w = 0; w < blur->wavelengths; w++) {
+            const es_spectral_band* band = &blur->bands[w];
+            if (band->rgb[0] + band->rgb[1] + band->rgb[2] == 0.0f) continue;
+            sum_columns(job, band, row_offset + group * VW, row_end, lines);
+            const vf red = vf_set1(band->rgb[0] * job->scale), green = vf_set1(band->rgb[1] * job->scale), blue = vf_set1(band->rgb[2] * job->scale);
+            for (uint32_t x = 0; x < columns; x++) {
+                const uint32_t count = band->count[column_offset + x];
+                if (!count) continue;
+                const float *weights = band->weights + (size_t)(column_offset + x) * band->most, *from = lines + (size_t)band->first[column_offset + x] * VW;
+                vf sum = vf_zero();
+                for (uint32_t t = 0; t < count; t++) sum = sum + vf_load(from + (size_t)t * VW) * vf_set1(weights[t]);
+                float* to = sums + (size_t)x * VW;
+                vf_store(to, vf_load(to) + sum * red);
+                vf_store(to + plane, vf_load(to + plane) + sum * green);
+                vf_store(to + 2 * plane, vf_load(to + 2 * plane) + sum * blue);
+            }
+        }
+        for (int k = 0; k < 3; k++)
+            for (size_t x = 0; x < job->stride; x += VW) {
+                vf rows[VW];
+                for (uint32_t i = 0; i < VW; i++) rows[i] = vf_load(sums + k * plane + (x + i) * VW);
+                vf_transpose8(rows);
+                for (uint32_t i = 0; i < VW; i++) vf_store(job->to[k] + ((size_t)group * VW + i) * job->stride + x, rows[i]);
+            }
+    }
+}
