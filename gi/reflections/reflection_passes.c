@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/edit/edit_pass.h"
 #include "gi/indirect.h"
 #include "gi/lamp_passes.h"
 #include "gi/reflections/map_faces.h"
@@ -284,7 +285,7 @@ es_result es_pass_reflection_maps(es_renderer* r, const es_frame_inputs* in)
     return ES_OK;
 }
 
-es_result es_pass_reflections(es_renderer* r, const es_frame_inputs* in, const float* const edited[3])
+es_result es_pass_reflections(es_renderer* r)
 {
     es_plan* plan = &r->plan;
     es_reflections* f = &r->reflections;
@@ -295,15 +296,14 @@ es_result es_pass_reflections(es_renderer* r, const es_frame_inputs* in, const f
     es_plan_begin(plan, ES_PASS_REFLECTIONS);
     es_plan_reads_pass(plan, ES_PASS_REFLECTING);
     es_plan_reads_pass(plan, ES_PASS_REFLECTION_MAPS);
+    es_plan_reads_pass(plan, ES_PASS_EDITS);
     if (!es_plan_run(plan, ES_PASS_REFLECTIONS)) return ES_OK;
     es_result result = es_planes_resize(r->context, &f->light, &r->gbuffer);
     if (result) return result;
     const es_reflection_atlas atlas = {f->texels, f->layout, {f->centre[0], f->centre[1], f->centre[2]}, f->last_level};
     es_reflected_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .planes = f->on_picture.planes, .atlas = &atlas, .lit = f->light.lit};
-    for (int k = 0; k < 3; k++) {
-        job.edited[k] = edited ? edited[k] : NULL;
-        job.out[k] = f->light.at[k];
-    }
+    es_edited_reflections(r, job.edited);
+    for (int k = 0; k < 3; k++) job.out[k] = f->light.at[k];
     es_reflected_from_maps(r->context, &job);
     es_plan_done(plan, ES_PASS_REFLECTIONS, (uint64_t)r->gbuffer.width * r->gbuffer.height);
     return ES_OK;

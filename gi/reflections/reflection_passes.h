@@ -17,8 +17,8 @@
 es_result es_pass_reflecting(es_renderer* renderer, const es_frame_inputs* in);
 /* After the light of the picture. */
 es_result es_pass_reflection_maps(es_renderer* renderer, const es_frame_inputs* in);
-/* What is seen along original directions, or where `edited` has them along these (es_reflected_job.edited). */
-es_result es_pass_reflections(es_renderer* renderer, const es_frame_inputs* in, const float* const edited[3]);
+/* What is seen along original directions, or along edited ones. */
+es_result es_pass_reflections(es_renderer* renderer);
 /* The job's part of it. */
 void es_reflections_compose(const es_renderer* renderer, es_compose_job* job);
 void es_reflections_read(es_plan* plan);
