@@ -42,9 +42,9 @@ static void add_shell(es_scene_builder* builder)
     es_shape_plane(&white, es_v3(low_x, lintel, low_z), es_v3(0, 0, size.z), es_v3(0, height - lintel, 0), es_v3(1, 0, 0), 4, 1);
     es_shape_plane(&white, es_v3(low_x, sill, low_z), es_v3(0, 0, low_w - low_z), es_v3(0, lintel - sill, 0), es_v3(1, 0, 0), 2, 2);
     es_shape_plane(&white, es_v3(low_x, sill, high_w), es_v3(0, 0, high_z - high_w), es_v3(0, lintel - sill, 0), es_v3(1, 0, 0), 2, 2);
-    es_build_object(builder, "white walls", &white, es_build_lambert(builder, "limewash", 0.76f, 0.74f, 0.68f), es_v3(0, 0, 0));
-    es_build_object(builder, "blue wall", &blue, es_build_lambert(builder, "delft", 0.20f, 0.32f, 0.52f), es_v3(0, 0, 0));
-    es_build_object(builder, "green wall", &green, es_build_lambert(builder, "pistachio", 0.44f, 0.56f, 0.34f), es_v3(0, 0, 0));
+    es_build_object(builder, "white slabs", &white, es_build_lambert(builder, "limewash", 0.76f, 0.74f, 0.68f), es_v3(0, 0, 0));
+    es_build_object(builder, "blue slabs", &blue, es_build_lambert(builder, "delft", 0.20f, 0.32f, 0.52f), es_v3(0, 0, 0));
+    es_build_object(builder, "green slabs", &green, es_build_lambert(builder, "pistachio", 0.44f, 0.56f, 0.34f), es_v3(0, 0, 0));
     es_shape bars = es_build_shape(builder);
     const float x = low_x - 0.05f, w = 0.03f, middle = 0.5f * (low_w + high_w);
     es_shape_box(&bars, es_v3(x, sill, low_w), es_v3(x + 0.1f, lintel, low_w + w));
@@ -55,7 +55,7 @@ static void add_shell(es_scene_builder* builder)
     es_build_object(builder, "window frame", &bars, es_build_lambert(builder, "white paint", 0.82f, 0.82f, 0.80f), es_v3(0, 0, 0));
     /* what is outside: a sky that glows */
     es_area_light_desc sky = es_default_area_light_desc();
-    sky.name = "sky";
+    sky.name = "sky, a flat lamp";
     sky.size[0] = 2.0f;
     sky.size[1] = 1.4f;
     memcpy(sky.color, (const float[3]){0.55f, 0.78f, 1.0f}, sizeof sky.color);
@@ -93,7 +93,7 @@ static void add_sink(es_scene_builder* builder, const detail* d)
     es_shape_plane(&basin, es_v3(left, deep, near), es_v3(right - left, 0, 0), es_v3(0, y + 0.01f - deep, 0), es_v3(0, 0, -1), 2, 1);
     es_shape_plane(&basin, es_v3(left, deep, far), es_v3(0, 0, near - far), es_v3(0, y + 0.01f - deep, 0), es_v3(1, 0, 0), 2, 1);
     es_shape_plane(&basin, es_v3(right, deep, far), es_v3(0, 0, near - far), es_v3(0, y + 0.01f - deep, 0), es_v3(-1, 0, 0), 2, 1);
-    es_build_object(builder, "sink", &basin, es_build_lambert(builder, "enamel", 0.84f, 0.84f, 0.82f), es_v3(0, 0, 0));
+    es_build_object(builder, "slabs of the sink", &basin, es_build_lambert(builder, "enamel", 0.84f, 0.84f, 0.82f), es_v3(0, 0, 0));
     static const es_vec2 pipe[] = {{0, 0}, {0.035f, 0}, {0.035f, 0.02f}, {0.016f, 0.04f}, {0.016f, 0.26f}, {0, 0.28f}};
     es_shape_lathe(&tap, es_v3(0.75f, y, low_z + 0.07f), pipe, sizeof pipe / sizeof pipe[0], steps(d, 24, 6));
     es_shape_box(&tap, es_v3(0.735f, y + 0.23f, low_z + 0.07f), es_v3(0.765f, y + 0.255f, low_z + 0.30f));
