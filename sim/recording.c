@@ -5,8 +5,10 @@
  * the step, and the short hashes the object. */
 #include "sim/recording.h"
 
+#include "sim/edits/edit_state.h"
+
 /* What a difference is looked for in: causes before what they cause. */
-static const es_object_kind compared[] = {ES_OBJECT_BODY, ES_OBJECT_JOINT, ES_OBJECT_SOFT, ES_OBJECT_CLIP, ES_OBJECT_MOVER, ES_OBJECT_NODE, ES_OBJECT_LIGHT, ES_OBJECT_CAMERA, ES_OBJECT_INSTANCE, ES_OBJECT_MESH};
+static const es_object_kind compared[] = {ES_OBJECT_BODY, ES_OBJECT_JOINT, ES_OBJECT_SOFT, ES_OBJECT_CLIP, ES_OBJECT_MOVER, ES_OBJECT_NODE, ES_OBJECT_LIGHT, ES_OBJECT_CAMERA, ES_OBJECT_INSTANCE, ES_OBJECT_MESH, ES_OBJECT_REGION, ES_OBJECT_CONSTRAINT};
 enum { COMPARED = sizeof compared / sizeof compared[0] };
 
 /* ---- inputs ---------------------------------------------------------------------------------------------------------- */
@@ -214,6 +216,17 @@ static void visit_input(state_io* io, es_input* in)
         visit_vector(io, &in->a);
         break;
     case ES_INPUT_SKY: es_visit_sky_desc(io, &in->sky); break;
+    case ES_INPUT_REGION:
+    case ES_INPUT_CONSTRAINT:
+    case ES_INPUT_EDITS: visit_state(io, in); break;
+    case ES_INPUT_PARAMETER:
+        visit_floats(io, &in->number, 1);
+        visit_state(io, in);
+        break;
+    case ES_INPUT_FREEZE:
+        visit_flag(io, &in->flag);
+        visit_position(io, in->place);
+        break;
     case ES_INPUT_GRAB_SOFT:
         visit_u32(io, &in->other);
         visit_u32(io, &in->vertex);
@@ -248,6 +261,11 @@ void es_note(es_world* world, const es_input* input)
     recording->input_count += io.at;
 }
 
+void es_recording_fail(es_world* world)
+{
+    if (world->recording && !world->recording->failed) world->recording->failed = es_context_last_result(world->context);
+}
+
 es_recording* es_recording_pause(es_world* world)
 {
     es_recording* recording = world->recording;
@@ -264,6 +282,13 @@ static es_result apply_weights(es_world* world, const es_input* in)
     es_result result = es_world_set_morph_weights(world, (es_mesh){in->id}, weights, (uint32_t)(in->state.size / sizeof *weights));
     es_release(world->context, weights, in->state.size);
     return result;
+}
+
+static es_result apply_parameter(es_world* world, const es_input* in)
+{
+    char name[ES_EDIT_NAME] = {0};
+    memcpy(name, in->state.bytes, in->state.size < sizeof name ? in->state.size : sizeof name - 1);
+    return es_world_set_parameter(world, name, in->number);
 }
 
 static es_result apply(es_world* world, const es_input* in)
@@ -302,6 +327,11 @@ static es_result apply(es_world* world, const es_input* in)
     case ES_INPUT_SOFT_DETACH: return es_world_soft_detach(world, (es_soft){in->id}, in->vertex);
     case ES_INPUT_SOFT_TEAR: return es_world_soft_tear(world, (es_soft){in->id}, in->place, in->number);
     case ES_INPUT_SKY: return es_world_set_sky(world, &in->sky);
+    case ES_INPUT_REGION: return es_edits_apply_note(world, ES_OBJECT_REGION, in->id, in->state.bytes, in->state.size);
+    case ES_INPUT_CONSTRAINT: return es_edits_apply_note(world, ES_OBJECT_CONSTRAINT, in->id, in->state.bytes, in->state.size);
+    case ES_INPUT_EDITS: return es_edits_apply_all(world, in->state.bytes, in->state.size);
+    case ES_INPUT_PARAMETER: return apply_parameter(world, in);
+    case ES_INPUT_FREEZE: return es_world_freeze_reflections(world, place);
     case ES_INPUT_SOFT_IMPULSE: return es_world_soft_impulse(world, (es_soft){in->id}, in->vertex, in->a);
     case ES_INPUT_SOFT_WAKE: return es_world_wake_soft(world, (es_soft){in->id});
     case ES_INPUT_GRAB_SOFT: return es_world_grab_soft(world, in->id, (es_soft){in->other}, in->vertex, in->place);

@@ -36,6 +36,11 @@ typedef enum es_input_type {
     ES_INPUT_SOFT_WAKE,
     ES_INPUT_GRAB_SOFT,
     ES_INPUT_SKY,
+    ES_INPUT_REGION,          /* state: the whole object under its handle; nothing: it is gone */
+    ES_INPUT_CONSTRAINT,      /* the same */
+    ES_INPUT_EDITS,           /* state: all regions and constraints */
+    ES_INPUT_PARAMETER,       /* state: the name; number: the value */
+    ES_INPUT_FREEZE,          /* flag: frozen, seen from `place` */
     ES_INPUT_TYPES
 } es_input_type;
 
@@ -44,7 +49,7 @@ typedef struct es_input {
     uint32_t id;              /* the object's handle, or the hand */
     uint32_t other;           /* GRAB_BODY: the body; GRAB_SOFT: the soft body */
     uint32_t vertex;          /* of a soft body, or ES_SOFT_ALL */
-    bool flag;                /* CLIP: plays; IMPULSE, FORCE: `place` was given */
+    bool flag;                /* CLIP: plays; IMPULSE, FORCE: `place` was given; FREEZE */
     double place[3];
     es_vec3 a, b;
     float number;
@@ -67,6 +72,8 @@ typedef struct es_input {
 
 /* Does nothing while nothing is recorded. What does not fit into memory is told by the recording's next function. */
 void es_note(es_world* world, const es_input* input);
+/* For who had no memory for what is to be noted. */
+void es_recording_fail(es_world* world);
 /* At the end of a step. */
 void es_recording_note_step(es_world* world, float dt);
 /* Between them nothing is noted. */

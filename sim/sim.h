@@ -19,6 +19,7 @@ extern "C" {
 
 typedef struct es_world es_world;
 typedef struct es_recording es_recording;
+typedef struct es_edit_history es_edit_history;
 
 typedef struct es_texture { uint32_t id; } es_texture;
 typedef struct es_material { uint32_t id; } es_material;
@@ -864,6 +865,19 @@ ES_API es_result es_world_geodesic(const es_world* world, es_instance instance, 
  * d² = sum b_i d_i² - sum b_i b_j |v_i - v_j|², exact for a point source in its plane. INFINITY when a corner's is. */
 ES_API float es_geodesic_between(const float corners[3], const float edges_squared[3], float u, float v);
 
+/* Undo and redo of regions and constraints (parameters and frozen reflections stay): moments of a world, kept as copies. What comes back has the handle it had. A history
+ * is destroyed before its world; several may watch one. max_bytes: of the copies, 0: 16 MB; the oldest are given up first. */
+ES_API es_result es_edit_history_create(es_world* world, size_t max_bytes, es_edit_history** history);
+ES_API void es_edit_history_destroy(es_edit_history* history); /* NULL: nothing */
+/* The present is a moment to come back to, `label` (NULL: "") what led there; what was undone can no more be redone. Nothing happens where nothing has changed. */
+ES_API es_result es_edit_history_commit(es_edit_history* history, const char* label);
+/* One moment back, or on; what has changed since the last is committed first, so that it can be redone. OK, and nothing, at the end. */
+ES_API es_result es_edit_history_undo(es_edit_history* history);
+ES_API es_result es_edit_history_redo(es_edit_history* history);
+/* What undo would take back and redo do again, as far as it has been committed; NULL: nothing. */
+ES_API const char* es_edit_history_undo_label(const es_edit_history* history);
+ES_API const char* es_edit_history_redo_label(const es_edit_history* history);
+
 /* What the light reads of the edits: those in effect, in slot order, resolved; places relative to es_world_origin. */
 #define ES_EVERY_INSTANCE 0xffffffffu
 typedef struct es_resolved_stroke { es_vec3 from, to; float radius; bool erase; } es_resolved_stroke;
@@ -941,7 +955,7 @@ ES_API uint64_t es_world_object_hash(const es_world* world, es_object_kind kind,
 /* ---- recording and replay -------------------------------------------------------------------------------------------------------------------------- */
 
 /* A recording notes what its world is told between steps (transforms, cameras, lights, movers, clips, settings, skies; poses, velocities, impulses,
- * forces and joints of bodies; hands; what is done to cloth; restored states), each step's dt, and hashes of what came of it. It begins
+ * forces and joints of bodies; hands; what is done to cloth; reflection edits, also new ones; restored states), each step's dt, and hashes of what came of it. It begins
  * with a saved state, so it may begin at any time. Objects are not to be made or destroyed meanwhile, nor meshes, materials or environments
  * changed, nor a sky ended; what a step function does is not noted, as it is there again on replay. One thread at a time uses a recording and its world.
  *

@@ -44,6 +44,27 @@ static bool reserve_slot(es_context* context, es_slots* slots)
     return true;
 }
 
+/* False after es_fail. */
+static bool copy_name(es_context* context, const char* name, char** copy)
+{
+    *copy = NULL;
+    if (!name || !*name) return true;
+    size_t size = strlen(name) + 1;
+    *copy = es_allocate(context, size);
+    if (*copy) memcpy(*copy, name, size);
+    return *copy != NULL;
+}
+
+static es_object* begin_object(es_slots* slots, uint32_t id, char* name)
+{
+    es_object* object = object_in(slots, es_slot_of(id));
+    memset(object, 0, slots->object_size);
+    object->id = id;
+    object->name = name;
+    slots->live++;
+    return object;
+}
+
 void* es_slots_add(es_context* context, es_slots* slots, const char* kind, const char* name)
 {
     bool reuse = slots->free_count > 0;
@@ -52,13 +73,8 @@ void* es_slots_add(es_context* context, es_slots* slots, const char* kind, const
         return NULL;
     }
     if (!reuse && !reserve_slot(context, slots)) return NULL;
-    char* copy = NULL;
-    if (name && *name) {
-        size_t size = strlen(name) + 1;
-        copy = es_allocate(context, size);
-        if (!copy) return NULL;
-        memcpy(copy, name, size);
-    }
+    char* copy;
+    if (!copy_name(context, name, &copy)) return NULL;
     uint32_t slot;
     if (reuse) {
         slot = slots->free_slots[--slots->free_count];
@@ -66,12 +82,55 @@ void* es_slots_add(es_context* context, es_slots* slots, const char* kind, const
         slot = slots->slot_count++;
         slots->generations[slot] = 1;
     }
-    es_object* object = object_in(slots, slot);
-    memset(object, 0, slots->object_size);
-    object->id = slots->generations[slot] << ES_SLOT_BITS | slot;
-    object->name = copy;
-    slots->live++;
-    return object;
+    return begin_object(slots, slots->generations[slot] << ES_SLOT_BITS | slot, copy);
+}
+
+void* es_slots_put(es_context* context, es_slots* slots, const char* kind, uint32_t id, const char* name)
+{
+    const uint32_t slot = es_slot_of(id), generation = id >> ES_SLOT_BITS;
+    if (slot >= slots->limit) {
+        es_fail(context, ES_INVALID_ARGUMENT, "%s: a world holds at most %u of them", kind, slots->limit);
+        return NULL;
+    }
+    while (slots->slot_count <= slot) {
+        if (!reserve_slot(context, slots)) return NULL;
+        slots->generations[slots->slot_count] = 1;
+        slots->free_slots[slots->free_count++] = slots->slot_count++;
+    }
+    char* copy;
+    if (!copy_name(context, name, &copy)) return NULL;
+    for (size_t i = slots->free_count; i-- > 0;) {
+        if (slots->free_slots[i] != slot) continue;
+        memmove(slots->free_slots + i, slots->free_slots + i + 1, (--slots->free_count - i) * sizeof *slots->free_slots);
+        break;
+    }
+    if (slots->generations[slot] < generation) slots->generations[slot] = generation;
+    return begin_object(slots, id, copy);
+}
+
+bool es_slots_succeed(es_context* context, es_slots* slots, const es_slots* others)
+{
+    for (uint32_t slot = 0; slot < others->slot_count; slot++) {
+        if (!reserve_slot(context, slots)) return false;
+        slots->generations[slots->slot_count++] = others->generations[slot];
+    }
+    for (uint32_t slot = others->slot_count; slot-- > 0;) { /* the first is to be taken first */
+        bool used = es_slots_at(others, slot) != NULL;
+        if (used && slots->generations[slot] == ES_GENERATION_LIMIT) continue;
+        slots->generations[slot] += used;
+        slots->free_slots[slots->free_count++] = slot;
+    }
+    /* those that others have retired stay so */
+    for (uint32_t slot = 0; slot < others->slot_count && others->free_count + others->live < others->slot_count; slot++) {
+        bool there = es_slots_at(others, slot) != NULL;
+        for (size_t i = 0; i < others->free_count && !there; i++) there = others->free_slots[i] == slot;
+        for (size_t i = 0; i < slots->free_count && !there; i++)
+            if (slots->free_slots[i] == slot) {
+                memmove(slots->free_slots + i, slots->free_slots + i + 1, (--slots->free_count - i) * sizeof *slots->free_slots);
+                break;
+            }
+    }
+    return true;
 }
 
 void* es_slots_at(const es_slots* slots, uint32_t slot)

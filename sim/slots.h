@@ -36,6 +36,10 @@ void* es_slots_add(es_context* context, es_slots* slots, const char* kind, const
 void* es_slots_get(const es_slots* slots, uint32_t id);    /* NULL: stale or null */
 void* es_slots_at(const es_slots* slots, uint32_t slot);   /* NULL: nothing there */
 void es_slots_remove(es_context* context, es_slots* slots, es_object* object);
+/* An object under a handle that is known, which must name no object nor share its slot with one: as es_slots_add, but that what was stale comes back. */
+void* es_slots_put(es_context* context, es_slots* slots, const char* kind, uint32_t id, const char* name);
+/* Makes initialised slots continue others: as many, all free, the next handle of each one that the others never gave out. False after es_fail. */
+bool es_slots_succeed(es_context* context, es_slots* slots, const es_slots* others);
 static inline uint32_t es_slot_of(uint32_t id) { return id & ES_SLOT_LIMIT; }
 
 #endif

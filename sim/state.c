@@ -6,6 +6,7 @@
 #include "sim/recording.h"
 #include "sim/state_io.h"
 
+#include "sim/edits/edit_state.h"
 #include "sim/soft/soft_state.h"
 #include "sim/rigid/rigid_state.h"
 
@@ -252,6 +253,8 @@ static void visit_object(es_world* world, state_io* io, es_object_kind kind, voi
     case ES_OBJECT_BODY: es_visit_body(world, io, object); break;
     case ES_OBJECT_JOINT: es_visit_joint(world, io, object); break;
     case ES_OBJECT_SOFT: es_visit_soft(world, io, object); break;
+    case ES_OBJECT_REGION: es_visit_region(io, object); break;
+    case ES_OBJECT_CONSTRAINT: es_visit_constraint(io, object); break;
     default: break; /* assets: nothing of them moves */
     }
 }
@@ -337,13 +340,15 @@ es_result es_world_save(const es_world* world, void* buffer, size_t* size)
     es_world* w = (es_world*)world; /* nothing is written to it in these modes */
     state_io io = {.mode = COUNT, .good = true};
     visit_world(w, &io);
-    size_t needed = sizeof(state_header) + io.at, capacity = *size;
+    const size_t moving = io.at, edits = es_edits_write(world, true, NULL);
+    size_t needed = sizeof(state_header) + moving + edits, capacity = *size;
     *size = needed;
     if (!buffer) return ES_OK;
     if (capacity < needed) return es_fail(world->context, ES_INVALID_ARGUMENT, "the world's state takes %zu bytes, room was given for %zu", needed, capacity);
     io = (state_io){.mode = WRITE, .bytes = (char*)buffer + sizeof(state_header), .good = true};
     visit_world(w, &io);
-    state_header header = {.content = content_signature(world), .payload = es_hash_bytes(0, io.bytes, io.at)};
+    if (edits) es_edits_write(world, true, io.bytes + moving);
+    state_header header = {.content = content_signature(world), .payload = es_hash_bytes(0, io.bytes, moving + edits)};
     memcpy(header.magic, magic, sizeof magic);
     memcpy(buffer, &header, sizeof header);
     return ES_OK;
@@ -364,12 +369,16 @@ es_result es_world_restore(es_world* world, const void* buffer, size_t size)
     state_io io = {.mode = CHECK, .bytes = payload, .size = payload_size, .good = true};
     visit_world(world, &io);
     if (io.no_memory) return es_context_last_result(context);
-    if (!io.good || io.at != payload_size) return es_fail(context, ES_FILE_DAMAGED, "restoring a world: the saved state is damaged");
+    es_edit_stage* edits = NULL;
+    es_result staged = io.good ? es_edits_stage(world, true, payload + io.at, payload_size - io.at, &edits) : ES_FILE_DAMAGED;
+    if (staged == ES_FILE_DAMAGED) return es_fail(context, staged, "restoring a world: the saved state is damaged");
+    if (staged != ES_OK) return staged;
     io = (state_io){.mode = APPLY, .bytes = payload, .size = payload_size, .good = true};
     es_recording* recording = es_recording_pause(world); /* it is one input, not those it is made of */
     es_fp_environment environment = es_fp_enter();
     visit_world(world, &io);
     if (io.good) es_sky_refresh(world);
+    es_edits_take(world, edits);
     es_fp_leave(environment);
     world->revisions.steps += 2;
     es_world_refresh(world);
@@ -385,7 +394,7 @@ uint64_t es_world_hash(const es_world* world)
     es_world_refresh(world);
     state_io io = {.mode = HASH, .hash = content_signature(world), .good = true};
     visit_world((es_world*)world, &io);
-    return io.hash;
+    return es_edits_hash(world, io.hash);
 }
 
 uint64_t es_world_object_hash(const es_world* world, es_object_kind kind, uint32_t id)

@@ -309,6 +309,217 @@ static void test_picking_finds_the_first_surface(void** state)
     close_scene(&s);
 }
 
+static void* save(const scene* s, size_t* size)
+{
+    assert_int_equal(es_world_save(s->world, NULL, size), ES_OK);
+    void* bytes = malloc(*size);
+    assert_int_equal(es_world_save(s->world, bytes, size), ES_OK);
+    return bytes;
+}
+
+/* Keys, strokes, a parameter, frozen: something of everything. */
+static void add_everything(const scene* s, es_constraint* c, es_region* r)
+{
+    es_constraint_desc d = constraint_desc(s);
+    es_constraint_key keys[2] = {{1, anchor_at(s, s->mirror, -0.6, 0, 0), {.kind = ES_ANCHOR_POINT, .point = {0, 0, 4}}, {1, 2, 3}}, {3, anchor_at(s, s->mirror, 0.6, 0.4, 0), anchor_at(s, s->other, 0, 0, 9), {0}}};
+    d.keys = keys;
+    d.key_count = 2;
+    d.parameter = (es_edit_parameter){.kind = ES_EDIT_NAMED, .name = "turn"};
+    d.geodesic = true;
+    *c = add_constraint(s, &d);
+    es_region_stroke stroke = {anchor_at(s, s->mirror, -0.8, -0.5, 0), anchor_at(s, s->mirror, 0.8, -0.5, 0), 0.3f, false};
+    assert_int_equal(es_world_add_region(s->world, &(es_region_desc){.name = "brushed", .type = ES_REGION_FREE_FORM, .border = 0.1f, .strokes = &stroke, .stroke_count = 1}, r), ES_OK);
+    assert_int_equal(es_world_set_parameter(s->world, "turn", 2), ES_OK);
+    assert_int_equal(es_world_freeze_reflections(s->world, (const double[3]){1, 2, 3}), ES_OK);
+}
+
+static void test_restoring_brings_back_what_there_was(void** state)
+{
+    scene s = open_scene();
+    size_t size[2];
+    uint64_t hash[2] = {es_world_hash(s.world)};
+    void* saved[2] = {save(&s, &size[0])};
+    es_constraint c;
+    es_region r;
+    add_everything(&s, &c, &r);
+    hash[1] = es_world_hash(s.world);
+    saved[1] = save(&s, &size[1]);
+    assert_true(hash[0] != hash[1]);
+    const uint64_t object_hash = es_world_object_hash(s.world, ES_OBJECT_CONSTRAINT, c.id);
+    const es_constraint_state before = state_of(&s, c);
+    for (int turn = 0; turn < 3; turn++) {
+        assert_int_equal(es_world_restore(s.world, saved[0], size[0]), ES_OK);
+        assert_true(es_world_hash(s.world) == hash[0]);
+        assert_int_equal(es_world_edits(s.world)->constraint_count + es_world_edits(s.world)->region_count, 0);
+        assert_false(es_world_frozen_reflections(s.world, NULL));
+        es_constraint_desc d;
+        assert_int_equal(es_world_get_constraint(s.world, c, &d), ES_STALE_HANDLE);
+        es_constraint_desc other = constraint_desc(&s);
+        es_constraint another = add_constraint(&s, &other);
+        assert_true(another.id != c.id);
+        assert_int_equal(es_world_restore(s.world, saved[1], size[1]), ES_OK);
+        assert_true(es_world_hash(s.world) == hash[1] && es_world_object_hash(s.world, ES_OBJECT_CONSTRAINT, c.id) == object_hash);
+        assert_int_equal(es_world_get_constraint(s.world, another, &d), ES_STALE_HANDLE);
+        assert_int_equal(es_world_get_constraint(s.world, c, &d), ES_OK);
+        assert_true(d.key_count == 2 && d.keys[0].direction.y == 2 && strcmp(d.parameter.name, "turn") == 0 && strcmp(d.name, "face") == 0);
+        assert_string_equal(es_world_name(s.world, ES_OBJECT_REGION, r.id), "brushed");
+        es_constraint_state now = state_of(&s, c);
+        assert_memory_equal(&now, &before, sizeof now);
+        assert_int_equal(es_world_edits(s.world)->region_count, 1);
+    }
+    /* cut short or changed, it is refused, with the world as it was */
+    ((char*)saved[1])[size[1] - 30] ^= 1;
+    assert_int_equal(es_world_restore(s.world, saved[1], size[1]), ES_FILE_DAMAGED);
+    assert_int_equal(es_world_restore(s.world, saved[1], size[1] - 9), ES_FILE_DAMAGED);
+    assert_true(es_world_hash(s.world) == hash[1]);
+    free(saved[0]);
+    free(saved[1]);
+    close_scene(&s);
+}
+
+static void test_recordings_note_edits(void** state)
+{
+    scene s = open_scene(), other = open_scene();
+    es_recording* recording;
+    es_constraint c;
+    es_region r;
+    es_edit_history* history;
+    assert_int_equal(es_edit_history_create(s.world, 0, &history), ES_OK);
+    assert_int_equal(es_recording_begin(s.world, NULL, NULL, &recording), ES_OK);
+    assert_int_equal(es_world_step(s.world, 0.1f), ES_OK);
+    add_everything(&s, &c, &r);
+    assert_int_equal(es_edit_history_commit(history, "all"), ES_OK);
+    assert_int_equal(es_world_step(s.world, 0.1f), ES_OK);
+    es_constraint_desc d;
+    assert_int_equal(es_world_get_constraint(s.world, c, &d), ES_OK);
+    d.key_count = 0;
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    assert_int_equal(es_world_destroy_region(s.world, r), ES_OK);
+    assert_int_equal(es_world_set_parameter(s.world, "turn", 2.5f), ES_OK);
+    assert_int_equal(es_world_step(s.world, 0.1f), ES_OK);
+    assert_int_equal(es_edit_history_undo(history), ES_OK);
+    assert_int_equal(es_world_freeze_reflections(s.world, NULL), ES_OK);
+    assert_int_equal(es_world_step(s.world, 0.1f), ES_OK);
+    es_recording_end(recording);
+    assert_int_equal(es_recording_rewind(recording, other.world), ES_OK);
+    for (uint32_t step = 0; step < es_recording_steps(recording); step++) {
+        es_divergence divergence;
+        assert_int_equal(es_recording_replay(recording, step, other.world, &divergence), ES_OK);
+        assert_false(divergence.differs);
+    }
+    assert_true(es_world_hash(s.world) == es_world_hash(other.world));
+    assert_string_equal(es_world_name(other.world, ES_OBJECT_REGION, r.id), "brushed");
+    es_recording_destroy(recording);
+    es_edit_history_destroy(history);
+    close_scene(&s);
+    close_scene(&other);
+}
+
+static void test_undo_takes_back_and_redo_does_again(void** state)
+{
+    scene s = open_scene();
+    es_edit_history* history;
+    assert_int_equal(es_edit_history_create(s.world, 0, &history), ES_OK);
+    assert_null(es_edit_history_undo_label(history));
+    uint64_t hashes[6] = {es_world_hash(s.world)};
+    es_constraint_desc d = constraint_desc(&s);
+    es_constraint c = add_constraint(&s, &d);
+    hashes[1] = es_world_hash(s.world);
+    assert_int_equal(es_edit_history_commit(history, "add a constraint"), ES_OK);
+    assert_int_equal(es_edit_history_commit(history, "nothing"), ES_OK);
+    d.reflected.point[0] = 7;
+    d.reflected.kind = ES_ANCHOR_POINT;
+    d.reflected.instance.id = 0;
+    assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+    hashes[2] = es_world_hash(s.world);
+    assert_int_equal(es_edit_history_commit(history, "move its green handle"), ES_OK);
+    es_region r = add_region(&s, ES_REGION_GEODESIC, 0.5f);
+    hashes[3] = es_world_hash(s.world);
+    assert_int_equal(es_edit_history_commit(history, "add a region"), ES_OK);
+    assert_int_equal(es_world_destroy_constraint(s.world, c), ES_OK);
+    hashes[4] = es_world_hash(s.world); /* not committed */
+    for (int turn = 0; turn < 3; turn++) {
+        for (int i = 3; i >= 0; i--) {
+            assert_int_equal(es_edit_history_undo(history), ES_OK);
+            assert_true(es_world_hash(s.world) == hashes[i]);
+        }
+        assert_int_equal(es_edit_history_undo(history), ES_OK);
+        assert_true(es_world_hash(s.world) == hashes[0] && !es_edit_history_undo_label(history));
+        assert_string_equal(es_edit_history_redo_label(history), "add a constraint");
+        for (int i = 1; i < 5; i++) {
+            assert_int_equal(es_edit_history_redo(history), ES_OK);
+            assert_true(es_world_hash(s.world) == hashes[i]);
+        }
+        assert_int_equal(es_edit_history_redo(history), ES_OK);
+        assert_true(es_world_hash(s.world) == hashes[4]);
+    }
+    assert_int_equal(es_edit_history_undo(history), ES_OK);
+    assert_int_equal(state_of(&s, c).effect, ES_EDIT_ACTIVE); /* under its handle */
+    /* what it is on goes while it is undone: it comes back without effect */
+    assert_int_equal(es_world_destroy_constraint(s.world, c), ES_OK);
+    assert_int_equal(es_world_destroy_instance(s.world, s.mirror), ES_OK);
+    assert_int_equal(es_edit_history_undo(history), ES_OK);
+    assert_int_equal(state_of(&s, c).effect, ES_EDIT_STALE);
+    es_region_state region;
+    assert_int_equal(es_world_get_region_state(s.world, r, &region), ES_OK);
+    assert_int_equal(region.effect, ES_EDIT_STALE);
+    /* another way from here */
+    assert_int_equal(es_world_destroy_region(s.world, r), ES_OK);
+    assert_int_equal(es_edit_history_commit(history, "destroy the region"), ES_OK);
+    assert_null(es_edit_history_redo_label(history));
+    es_edit_history_destroy(history);
+    close_scene(&s);
+}
+
+static void test_history_keeps_within_its_memory(void** state)
+{
+    scene s = open_scene();
+    es_edit_history* history;
+    assert_int_equal(es_edit_history_create(s.world, 8192, &history), ES_OK);
+    es_constraint_desc d = constraint_desc(&s);
+    es_constraint c = add_constraint(&s, &d);
+    const size_t before = es_context_bytes(s.context);
+    for (int i = 0; i < 2000; i++) {
+        d.eye[0] = i;
+        assert_int_equal(es_world_set_constraint(s.world, c, &d), ES_OK);
+        assert_int_equal(es_edit_history_commit(history, "look from elsewhere"), ES_OK);
+    }
+    assert_true(es_context_bytes(s.context) < before + 32768);
+    int back = 0;
+    for (; es_edit_history_undo_label(history); back++) assert_int_equal(es_edit_history_undo(history), ES_OK);
+    assert_true(back > 5 && back < 200);
+    assert_int_equal(es_world_get_constraint(s.world, c, &d), ES_OK);
+    assert_true(d.eye[0] == 1999 - back);
+    es_edit_history_destroy(history);
+    close_scene(&s);
+}
+
+static void test_a_thousand_constraints(void** state)
+{
+    scene s = open_scene();
+    es_constraint_desc d = constraint_desc(&s);
+    for (uint32_t i = 0; i < 1000; i++) {
+        d.reflecting.triangle = i % 128;
+        d.reflecting.u = 0.3f * es_random_float(1, i / 10);
+        d.reflecting.v = 0.1f; /* several at one place */
+        add_constraint(&s, &d);
+    }
+    for (uint32_t i = 0; i < 20; i++) add_region(&s, i & 1 ? ES_REGION_GEODESIC : ES_REGION_EUCLIDEAN, 0.1f * (float)i);
+    assert_int_equal(es_world_edits(s.world)->constraint_count, 1000);
+    size_t size;
+    void* saved = save(&s, &size);
+    const uint64_t hash = es_world_hash(s.world);
+    uint32_t ids[1000];
+    size_t count = 1000;
+    assert_int_equal(es_world_enumerate(s.world, ES_OBJECT_CONSTRAINT, ids, &count), ES_OK);
+    for (uint32_t i = 0; i < 1000; i += 3) assert_int_equal(es_world_destroy_constraint(s.world, (es_constraint){ids[i]}), ES_OK);
+    assert_int_equal(es_world_edits(s.world)->constraint_count, 666);
+    assert_int_equal(es_world_restore(s.world, saved, size), ES_OK);
+    assert_true(es_world_hash(s.world) == hash && es_world_edits(s.world)->constraint_count == 1000);
+    free(saved);
+    close_scene(&s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -319,6 +530,11 @@ int main(void)
         cmocka_unit_test(test_the_list_counts_what_differs),
         cmocka_unit_test(test_keys_go_by_their_parameter),
         cmocka_unit_test(test_picking_finds_the_first_surface),
+        cmocka_unit_test(test_restoring_brings_back_what_there_was),
+        cmocka_unit_test(test_recordings_note_edits),
+        cmocka_unit_test(test_undo_takes_back_and_redo_does_again),
+        cmocka_unit_test(test_history_keeps_within_its_memory),
+        cmocka_unit_test(test_a_thousand_constraints),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

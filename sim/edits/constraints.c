@@ -1,6 +1,5 @@
 /* Constraints: what is to be seen at a place of a mirror; keys that move it. */
-#include "sim/edits/edits.h"
-#include "sim/recording.h"
+#include "sim/edits/edit_state.h"
 
 #include <string.h>
 
@@ -15,29 +14,36 @@ static bool directed(es_vec3 d)
 
 static bool on_surface(const es_anchor* a) { return es_anchor_valid(a) && a->kind != ES_ANCHOR_POINT; }
 
-es_result es_constraint_check(es_context* context, const es_constraint_desc* d)
+const char* es_constraint_valid(const es_constraint_desc* d, uint32_t* key)
 {
-    const char* name = d->name ? d->name : "";
-    es_anchor eye = {.kind = ES_ANCHOR_POINT, .point = {d->eye[0], d->eye[1], d->eye[2]}};
-    if (!on_surface(&d->reflecting) || !es_anchor_valid(&d->reflected))
-        return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': its reflecting handle must be on a surface and its reflected one finite and, on a triangle, within it", name);
-    if (!es_all_within(&d->direction.x, 3, ES_WORLD_EXTENT) || (d->refraction && !directed(d->direction)))
-        return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': its direction must be finite, and a refraction must have one", name);
-    if (!es_anchor_valid(&eye) || !es_all_within(&d->orientation.x, 4, ES_WORLD_EXTENT) || !es_within(d->fov_y, 0, 3.1f))
-        return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': its view needs a finite eye and orientation and a fov_y of 0 … 3.1 radians", name);
-    const es_edit_parameter* p = &d->parameter;
-    size_t length = p->name ? strlen(p->name) : 0;
-    if ((uint32_t)p->kind > ES_EDIT_NAMED || p->axis > 2 || length >= ES_EDIT_NAME || (p->kind == ES_EDIT_NAMED && !length))
-        return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': its parameter must be of es_edit_parameter_kind, with an axis of 0 … 2, and a named one with a name of 1 … %d bytes", name, ES_EDIT_NAME - 1);
-    if (d->key_count > ES_EDIT_KEYS || (d->key_count && !d->keys)) return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': %u keys; 0 … %d are accepted", name, d->key_count, ES_EDIT_KEYS);
+    const es_anchor eye = {.kind = ES_ANCHOR_POINT, .point = {d->eye[0], d->eye[1], d->eye[2]}};
+    const size_t length = d->parameter.name ? strlen(d->parameter.name) : 0;
+    *key = UINT32_MAX;
+    if (!on_surface(&d->reflecting)) return "its reflecting handle must be on a surface, with u and v of 0 … 1 that sum to no more";
+    if (!es_anchor_valid(&d->reflected)) return "its reflected handle must be finite and within 1e9 and, on a triangle, have u and v of 0 … 1 that sum to no more";
+    if (!es_all_within(&d->direction.x, 3, ES_WORLD_EXTENT) || (d->refraction && !directed(d->direction))) return "its direction must be finite, and a refraction must have one";
+    if (!es_anchor_valid(&eye) || !es_all_within(&d->orientation.x, 4, ES_WORLD_EXTENT)) return "the eye and the orientation of its view must be finite and within 1e9";
+    if (!es_within(d->fov_y, 0, 3.1f)) return "the fov_y of its view must lie in 0 … 3.1 radians";
+    if ((uint32_t)d->parameter.kind > ES_EDIT_NAMED || d->parameter.axis > 2) return "its parameter must be of es_edit_parameter_kind, with an axis of 0 … 2";
+    if (length >= ES_EDIT_NAME || (d->parameter.kind == ES_EDIT_NAMED && !length)) return "the name of its parameter must have 1 … 63 bytes";
+    if (d->key_count > ES_EDIT_KEYS || (d->key_count && !d->keys)) return "it may have up to 4096 keys";
     for (uint32_t i = 0; i < d->key_count; i++) {
         const es_constraint_key* k = &d->keys[i];
-        if (!on_surface(&k->reflecting) || !es_anchor_valid(&k->reflected) || !es_all_within(&k->direction.x, 3, ES_WORLD_EXTENT) || !es_within(k->at, -ES_WORLD_EXTENT, ES_WORLD_EXTENT) ||
-            (d->refraction && !directed(k->direction)))
-            return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': key %u needs finite numbers, a reflecting handle on a surface and, of a refraction, a direction", name, i);
-        if (i && !(k->at > d->keys[i - 1].at)) return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': keys must increase, and key %u is at %g after %g", name, i, (double)k->at, (double)d->keys[i - 1].at);
+        *key = i;
+        if (!es_within(k->at, -ES_WORLD_EXTENT, ES_WORLD_EXTENT) || (i && k->at <= d->keys[i - 1].at)) return "must be at a number within 1e9, greater than the one before";
+        if (!on_surface(&k->reflecting) || !es_anchor_valid(&k->reflected)) return "must have a reflecting handle on a surface, and places that are finite and, on a triangle, within it";
+        if (!es_all_within(&k->direction.x, 3, ES_WORLD_EXTENT) || (d->refraction && !directed(k->direction))) return "must have a finite direction, and of a refraction one that is not zero";
     }
-    return ES_OK;
+    return NULL;
+}
+
+static es_result check(es_context* context, const es_constraint_desc* d)
+{
+    uint32_t key;
+    const char* wrong = es_constraint_valid(d, &key);
+    if (!wrong) return ES_OK;
+    if (key != UINT32_MAX) return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': key %u %s", d->name ? d->name : "", key, wrong);
+    return es_fail(context, ES_INVALID_ARGUMENT, "constraint '%.64s': %s", d->name ? d->name : "", wrong);
 }
 
 void es_constraint_object_free(es_context* context, es_constraint_object* constraint)
@@ -75,7 +81,7 @@ es_result es_world_add_constraint(es_world* world, const es_constraint_desc* des
     es_context* context = world->context;
     if (!desc || !constraint) return es_misuse(context, ES_INVALID_ARGUMENT, "es_world_add_constraint: desc and constraint must not be NULL");
     *constraint = (es_constraint){0};
-    es_result result = es_constraint_check(context, desc);
+    es_result result = check(context, desc);
     if (result != ES_OK) return result;
     es_edits* edits = es_edits_of(world);
     if (!edits || !es_edits_reserve(world, 0, 1, 0)) return es_context_last_result(context);
@@ -87,6 +93,7 @@ es_result es_world_add_constraint(es_world* world, const es_constraint_desc* des
     }
     edits->changes++;
     constraint->id = object->object.id;
+    es_edits_note(world, ES_OBJECT_CONSTRAINT, constraint->id);
     return ES_OK;
 }
 
@@ -96,10 +103,11 @@ es_result es_world_set_constraint(es_world* world, es_constraint constraint, con
     es_constraint_object* object = constraint_object(world, constraint);
     if (!object) return ES_STALE_HANDLE;
     if (!desc) return es_misuse(world->context, ES_INVALID_ARGUMENT, "es_world_set_constraint: desc must not be NULL");
-    es_result result = es_constraint_check(world->context, desc);
+    es_result result = check(world->context, desc);
     if (result != ES_OK) return result;
     if (!es_constraint_put(world->context, object, desc)) return es_context_last_result(world->context);
     world->edits->changes++;
+    es_edits_note(world, ES_OBJECT_CONSTRAINT, constraint.id);
     return ES_OK;
 }
 
@@ -121,6 +129,7 @@ es_result es_world_destroy_constraint(es_world* world, es_constraint constraint)
     world->edits->changes++;
     es_constraint_object_free(world->context, object);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_CONSTRAINT], &object->object);
+    es_edits_note(world, ES_OBJECT_CONSTRAINT, constraint.id);
     return ES_OK;
 }
 

@@ -79,9 +79,9 @@ void es_anchor_edges(const es_world* world, const es_anchored* found, uint32_t t
 
 void es_region_object_free(es_context* context, es_region_object* region);
 void es_constraint_object_free(es_context* context, es_constraint_object* constraint);
-/* OK, or a failure with its message. */
-es_result es_region_check(es_context* context, const es_region_desc* desc);
-es_result es_constraint_check(es_context* context, const es_constraint_desc* desc);
+/* NULL, or what is wrong: with the desc, or, where that is no UINT32_MAX, with the stroke or key of that number. */
+const char* es_region_valid(const es_region_desc* desc, uint32_t* stroke);
+const char* es_constraint_valid(const es_constraint_desc* desc, uint32_t* key);
 /* Copies a checked desc into the object; false after es_fail, with the object as it was. */
 bool es_region_put(es_context* context, es_region_object* region, const es_region_desc* desc);
 bool es_constraint_put(es_context* context, es_constraint_object* constraint, const es_constraint_desc* desc);

@@ -33,6 +33,7 @@ es_result es_world_set_parameter(es_world* world, const char* name, float value)
     }
     parameter->value = value;
     edits->changes++;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_PARAMETER, .number = value, .state = {name, length}});
     return ES_OK;
 }
 
@@ -54,6 +55,7 @@ es_result es_world_freeze_reflections(es_world* world, const double eye[3])
     edits->frozen = eye != NULL;
     memcpy(edits->eye, place.point, sizeof edits->eye);
     edits->changes++;
+    if (world->recording) es_note(world, &(es_input){.type = ES_INPUT_FREEZE, .flag = eye != NULL, .place = {place.point[0], place.point[1], place.point[2]}});
     return ES_OK;
 }
 

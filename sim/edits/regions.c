@@ -1,6 +1,5 @@
 /* Regions: where edits may change anything. */
-#include "sim/edits/edits.h"
-#include "sim/recording.h"
+#include "sim/edits/edit_state.h"
 
 #include <string.h>
 
@@ -8,21 +7,30 @@
 
 es_region_desc es_default_region_desc(void) { return (es_region_desc){.radius = 0.5f, .border = 0.2f}; }
 
-es_result es_region_check(es_context* context, const es_region_desc* d)
+const char* es_region_valid(const es_region_desc* d, uint32_t* stroke)
 {
-    const char* name = d->name ? d->name : "";
-    if ((uint32_t)d->type > ES_REGION_FREE_FORM) return es_fail(context, ES_INVALID_ARGUMENT, "region '%.64s': its type must be one of es_region_type", name);
-    if (!es_within(d->radius, 0, ES_WORLD_EXTENT) || !es_within(d->border, 0, ES_WORLD_EXTENT) || !es_anchor_valid(&d->centre))
-        return es_fail(context, ES_INVALID_ARGUMENT, "region '%.64s': it needs a radius and a border of 0 … 1e9 m, and a centre that is finite and, on a triangle, within it", name);
-    if (d->stroke_count > ES_EDIT_STROKES || (d->stroke_count && !d->strokes))
-        return es_fail(context, ES_INVALID_ARGUMENT, "region '%.64s': %u strokes; 0 … %d are accepted", name, d->stroke_count, ES_EDIT_STROKES);
+    *stroke = UINT32_MAX;
+    if ((uint32_t)d->type > ES_REGION_FREE_FORM) return "its type must be one of es_region_type";
+    if (!es_within(d->radius, 0, ES_WORLD_EXTENT) || !es_within(d->border, 0, ES_WORLD_EXTENT)) return "its radius and border must lie in 0 … 1e9 m";
+    if (!es_anchor_valid(&d->centre)) return "its centre must be finite and within 1e9 and, on a triangle, have u and v of 0 … 1 that sum to no more";
+    if (d->stroke_count > ES_EDIT_STROKES || (d->stroke_count && !d->strokes)) return "it may have up to 4096 strokes";
     for (uint32_t i = 0; i < d->stroke_count; i++) {
         const es_region_stroke* s = &d->strokes[i];
-        bool good = s->from.kind == ES_ANCHOR_SURFACE && s->to.kind == ES_ANCHOR_SURFACE && es_anchor_valid(&s->from) && es_anchor_valid(&s->to) && es_within(s->radius, 0, ES_WORLD_EXTENT);
-        if (!good || s->from.instance.id != d->strokes[0].from.instance.id || s->to.instance.id != s->from.instance.id)
-            return es_fail(context, ES_INVALID_ARGUMENT, "region '%.64s': stroke %u must lead from one place of a surface to another of the same instance as the first stroke's, with a radius of 0 … 1e9 m", name, i);
+        *stroke = i;
+        if (s->from.kind != ES_ANCHOR_SURFACE || s->to.kind != ES_ANCHOR_SURFACE || !es_anchor_valid(&s->from) || !es_anchor_valid(&s->to)) return "must lead from one place of a surface to another";
+        if (!es_within(s->radius, 0, ES_WORLD_EXTENT)) return "must have a radius of 0 … 1e9 m";
+        if (s->from.instance.id != d->strokes[0].from.instance.id || s->to.instance.id != s->from.instance.id) return "must be on the instance that the first one is on";
     }
-    return ES_OK;
+    return NULL;
+}
+
+static es_result check(es_context* context, const es_region_desc* d)
+{
+    uint32_t stroke;
+    const char* wrong = es_region_valid(d, &stroke);
+    if (!wrong) return ES_OK;
+    if (stroke != UINT32_MAX) return es_fail(context, ES_INVALID_ARGUMENT, "region '%.64s': stroke %u %s", d->name ? d->name : "", stroke, wrong);
+    return es_fail(context, ES_INVALID_ARGUMENT, "region '%.64s': %s", d->name ? d->name : "", wrong);
 }
 
 void es_region_object_free(es_context* context, es_region_object* region)
@@ -56,7 +64,7 @@ es_result es_world_add_region(es_world* world, const es_region_desc* desc, es_re
     es_context* context = world->context;
     if (!desc || !region) return es_misuse(context, ES_INVALID_ARGUMENT, "es_world_add_region: desc and region must not be NULL");
     *region = (es_region){0};
-    es_result result = es_region_check(context, desc);
+    es_result result = check(context, desc);
     if (result != ES_OK) return result;
     es_edits* edits = es_edits_of(world);
     if (!edits || !es_edits_reserve(world, 1, 0, desc->stroke_count)) return es_context_last_result(context);
@@ -69,6 +77,7 @@ es_result es_world_add_region(es_world* world, const es_region_desc* desc, es_re
     edits->strokes += desc->stroke_count;
     edits->changes++;
     region->id = object->object.id;
+    es_edits_note(world, ES_OBJECT_REGION, region->id);
     return ES_OK;
 }
 
@@ -79,12 +88,13 @@ es_result es_world_set_region(es_world* world, es_region region, const es_region
     es_region_object* object = region_object(world, region);
     if (!object) return ES_STALE_HANDLE;
     if (!desc) return es_misuse(context, ES_INVALID_ARGUMENT, "es_world_set_region: desc must not be NULL");
-    es_result result = es_region_check(context, desc);
+    es_result result = check(context, desc);
     if (result != ES_OK) return result;
     const uint32_t before = object->desc.stroke_count;
     if (!es_edits_reserve(world, 0, 0, desc->stroke_count) || !es_region_put(context, object, desc)) return es_context_last_result(context);
     world->edits->strokes = world->edits->strokes - before + desc->stroke_count;
     world->edits->changes++;
+    es_edits_note(world, ES_OBJECT_REGION, region.id);
     return ES_OK;
 }
 
@@ -107,6 +117,7 @@ es_result es_world_destroy_region(es_world* world, es_region region)
     world->edits->changes++;
     es_region_object_free(world->context, object);
     es_slots_remove(world->context, &world->slots[ES_OBJECT_REGION], &object->object);
+    es_edits_note(world, ES_OBJECT_REGION, region.id);
     return ES_OK;
 }
 
