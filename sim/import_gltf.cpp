@@ -24,6 +24,7 @@ extern "C" {
 #include "platform/context.h"
 #include "platform/maths.h"
 }
+#include "sim/edits/edit_file.h"
 #include "sim/gltf_environment.h"
 #include "sim/gltf_file.h"
 #include "sim/gltf_physics.h"
@@ -248,6 +249,7 @@ class importer
         add_cameras();
         add_clips();
         add_physics();
+        check(es_edits_import(world, path, file.json, file.json_size));
         check(es_world_finish_opening(world));
         warn_of_left_out();
         es_world* finished = world;

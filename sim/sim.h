@@ -878,6 +878,25 @@ ES_API es_result es_edit_history_redo(es_edit_history* history);
 ES_API const char* es_edit_history_undo_label(const es_edit_history* history);
 ES_API const char* es_edit_history_redo_label(const es_edit_history* history);
 
+/* Edits in a glTF file: extras of its scene, which es_world_import_gltf reads too (SI units, members as in the descs, all optional where they have a default):
+ *   "extras": {"earthshine": {"edits": {"version": 1, "parameters": {NAME: value …},
+ *     "regions": [{"name", "type": "euclidean" | "geodesic" | "freeForm", "centre": ANCHOR, "radius", "border", "off",
+ *                  "strokes": [{"from": ANCHOR, "to": ANCHOR, "radius", "erase"} …]} …],
+ *     "constraints": [{"name", "reflecting": ANCHOR, "reflected": ANCHOR, "refraction", "direction": [x, y, z], "eye": [x, y, z],
+ *                      "orientation": [x, y, z, w], "fovY", "followsView", "geodesic", "off",
+ *                      "parameter": {"kind": "time" | "camera" | "node" | "light" | "named", "camera" or "node" or "light": NAME, "index", "axis": "x" | "y" | "z", "name"},
+ *                      "keys": [{"at", "reflecting": ANCHOR, "reflected": ANCHOR, "direction"} …]} …]}}}
+ *   ANCHOR: {"node": NAME, "instance": which of that node's (0), "index": which of all, "triangle", "u", "v"}, or {"point": [x, y, z]}, in a node's axes with "node".
+ * An "index" says which of several things by one name is meant, and which of those without. */
+
+/* Puts a file's regions and constraints in the place of those there are, and sets its parameters; what stood there before can be undone. A file of the edits alone, or the whole of a
+ * glTF file. FILE_DAMAGED when something in it is wrong or names what the world does not have; nothing is changed then. Members that are not known are warned of. */
+ES_API es_result es_world_load_edits(es_world* world, const char* path);
+/* source NULL: a glTF file of the edits alone. Otherwise a copy of that .gltf or .glb file, from which the world was opened, with the edits in its scene's extras and
+ * every other byte as it was. Reading them again gives the same bits. What is stale or has no place is left out with a warning. Whole or not at all; path may be that of
+ * the source. FILE_UNSUPPORTED when the source has no scene, or files beside it that are not beside `path`. */
+ES_API es_result es_world_save_edits(const es_world* world, const char* source, const char* path);
+
 /* What the light reads of the edits: those in effect, in slot order, resolved; places relative to es_world_origin. */
 #define ES_EVERY_INSTANCE 0xffffffffu
 typedef struct es_resolved_stroke { es_vec3 from, to; float radius; bool erase; } es_resolved_stroke;

@@ -297,6 +297,82 @@ static void read_values(es_context* context, state_io* io, es_edit_stage* stage)
     stage->values = true;
 }
 
+static size_t more(size_t wanted, size_t present) { return wanted > present ? wanted - present : 0; }
+
+bool es_edit_stage_reserve(es_world* world, const es_edit_stage* stage)
+{
+    return es_edits_of(world) && es_edits_reserve(world, more(stage->slots[0].live, world->slots[kinds[0]].live), more(stage->slots[1].live, world->slots[kinds[1]].live), more(stage->strokes, world->edits->strokes));
+}
+
+/* Slots that go on from the world's. False after es_fail. */
+static bool begin_slots(es_world* world, es_edit_stage* stage)
+{
+    for (int k = 0; k < 2; k++) {
+        const es_slots* old = &world->slots[kinds[k]];
+        es_slots_init(&stage->slots[k], old->object_size, old->limit);
+        if (!es_slots_succeed(world->context, &stage->slots[k], old)) return false;
+    }
+    return true;
+}
+
+es_edit_stage* es_edit_stage_begin(es_world* world)
+{
+    es_edit_stage* stage = es_allocate_zero(world->context, sizeof *stage);
+    if (stage && begin_slots(world, stage)) return stage;
+    es_edit_stage_free(world, stage);
+    return NULL;
+}
+
+bool es_edit_stage_add_region(es_world* world, es_edit_stage* stage, const es_region_desc* desc)
+{
+    es_region_object* object = es_slots_add(world->context, &stage->slots[0], "region", desc->name);
+    if (!object) return false;
+    stage->strokes += desc->stroke_count;
+    return es_region_put(world->context, object, desc);
+}
+
+bool es_edit_stage_add_constraint(es_world* world, es_edit_stage* stage, const es_constraint_desc* desc)
+{
+    es_constraint_object* object = es_slots_add(world->context, &stage->slots[1], "constraint", desc->name);
+    return object && es_constraint_put(world->context, object, desc);
+}
+
+bool es_edit_stage_set_parameter(es_world* world, es_edit_stage* stage, const char* name, float value)
+{
+    es_context* context = world->context;
+    if (!stage->values) { /* from now on the stage's own: those the world has, to begin with */
+        const es_edits* edits = world->edits;
+        const size_t count = edits ? edits->parameter_count : 0;
+        if (count) stage->parameters = es_allocate(context, count * sizeof *stage->parameters);
+        if (count && !stage->parameters) return false;
+        if (count) memcpy(stage->parameters, edits->parameters, count * sizeof *stage->parameters);
+        stage->parameter_count = (uint32_t)count;
+        stage->frozen = edits && edits->frozen;
+        if (edits) memcpy(stage->eye, edits->eye, sizeof stage->eye);
+        stage->values = true;
+    }
+    uint32_t at = 0;
+    while (at < stage->parameter_count && strcmp(stage->parameters[at].name, name) < 0) at++;
+    if (at < stage->parameter_count && strcmp(stage->parameters[at].name, name) == 0) {
+        stage->parameters[at].value = value;
+        return true;
+    }
+    if (stage->parameter_count == ES_EDIT_PARAMETERS) {
+        es_fail(context, ES_INVALID_ARGUMENT, "parameter '%s': a world has at most %d", name, ES_EDIT_PARAMETERS);
+        return false;
+    }
+    es_parameter* more_parameters = es_allocate_zero(context, (stage->parameter_count + (size_t)1) * sizeof *more_parameters);
+    if (!more_parameters) return false;
+    memcpy(more_parameters, stage->parameters ? stage->parameters : more_parameters, at * sizeof *more_parameters);
+    strncpy(more_parameters[at].name, name, ES_EDIT_NAME - 1);
+    more_parameters[at].value = value;
+    for (uint32_t i = at; i < stage->parameter_count; i++) more_parameters[i + 1] = stage->parameters[i];
+    es_release(context, stage->parameters, stage->parameter_count * sizeof *stage->parameters);
+    stage->parameters = more_parameters;
+    stage->parameter_count++;
+    return true;
+}
+
 es_result es_edits_stage(es_world* world, bool values, const void* bytes, size_t size, es_edit_stage** out)
 {
     es_context* context = world->context;
@@ -307,15 +383,10 @@ es_result es_edits_stage(es_world* world, bool values, const void* bytes, size_t
     state_io io = {.mode = CHECK, .bytes = (char*)bytes, .size = size, .good = true};
     stage->values = values;
     if (size && values) read_values(context, &io, stage);
-    for (int k = 0; k < 2; k++) {
-        const es_slots* old = &world->slots[kinds[k]];
-        es_slots_init(&stage->slots[k], old->object_size, old->limit);
-        if (io.good && !es_slots_succeed(context, &stage->slots[k], old)) no_memory(&io);
-    }
-    uint32_t counts[2] = {0, 0};
+    if (io.good && !begin_slots(world, stage)) no_memory(&io);
     for (int k = 0; k < 2 && size && io.good; k++) {
-        counts[k] = read_count(&io, stage->slots[k].limit, sizeof(uint32_t));
-        for (uint32_t i = 0; i < counts[k] && io.good; i++) {
+        const uint32_t count = read_count(&io, stage->slots[k].limit, sizeof(uint32_t));
+        for (uint32_t i = 0; i < count && io.good; i++) {
             uint32_t id = 0;
             visit_u32(&io, &id);
             const void* object = io.good ? read_object(context, &io, &stage->slots[k], k, id) : NULL;
@@ -323,10 +394,7 @@ es_result es_edits_stage(es_world* world, bool values, const void* bytes, size_t
         }
     }
     io.good = io.good && io.at == size;
-    const es_slots* now = world->slots;
-    if (io.good && (!es_edits_of(world) || !es_edits_reserve(world, counts[0] > now[kinds[0]].live ? counts[0] - now[kinds[0]].live : 0, counts[1] > now[kinds[1]].live ? counts[1] - now[kinds[1]].live : 0,
-                                               stage->strokes > world->edits->strokes ? stage->strokes - world->edits->strokes : 0)))
-        no_memory(&io);
+    if (io.good && !es_edit_stage_reserve(world, stage)) no_memory(&io);
     if (io.good) {
         *out = stage;
         return ES_OK;
@@ -406,6 +474,15 @@ void es_edits_note_all(es_world* world)
     es_edits_write(world, false, bytes);
     es_note(world, &(es_input){.type = ES_INPUT_EDITS, .state = {bytes, size}});
     es_release(world->context, bytes, size + 1);
+}
+
+void es_edits_note_parameters(es_world* world)
+{
+    if (!world->recording || world->in_step) return;
+    for (size_t i = 0; i < world->edits->parameter_count; i++) {
+        const es_parameter* p = &world->edits->parameters[i];
+        es_note(world, &(es_input){.type = ES_INPUT_PARAMETER, .number = p->value, .state = {p->name, strlen(p->name)}});
+    }
 }
 
 /* As it was noted: made anew under its handle, or, of no bytes, destroyed. */
