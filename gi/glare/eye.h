@@ -14,7 +14,7 @@
 #include "gi/glare/step_grid.h"
 #include "gi/glare/vitreous.h"
 
-enum { ES_CORNEA_PARTICLES = 290 };
+enum { ES_CORNEA_PARTICLES = 250 };
 
 /* Every strength may be 0, every part off. */
 typedef struct es_eye_subject {

@@ -30,7 +30,7 @@ void es_lens_begin(es_lens* lens, uint32_t seed)
     lens->period = 0.050f * (0.9f + 0.2f * es_random_float(seed, counter++));
     for (uint32_t i = 0; i < ES_LENS_GRATINGS; i++) {
         es_lens_grating* g = &lens->gratings[i];
-        const float inner = (1.2f + 3.0f * es_random_float(seed, counter++)) / ES_LENS_RADIUS, outer = inner + 0.35f / ES_LENS_RADIUS;
+        const float inner = (0.9f + 3.3f * es_random_float(seed, counter++)) / ES_LENS_RADIUS, outer = inner + 0.18f / ES_LENS_RADIUS;
         /* in the cortex: next to the surface in front or behind */
         const float depth = 0.5f * es_sqrt(1.0f - inner * inner) * (0.8f + 0.2f * es_random_float(seed, counter++));
         const float v = es_random_float(seed, counter++) < 0.5f ? 0.5f - depth : 0.5f + depth;
@@ -52,13 +52,14 @@ static float sine_of_turns(double turns)
 float es_lens_accommodation(uint32_t seed, double time, float pupil)
 {
     enum { TONES = 6 };
-    const float low = 0.06f * es_sqrt(es_maxf(pupil, 0) * 0.25f) * es_value_noise(seed, 0.08 * time, 3);
+    /* Dioptres' tenths move the rim by hundredths of a millimetre, which at the fibres' true distance is much; here they are five times as far apart, and it is to be seen. */
+    const float low = 0.5f * es_sqrt(es_maxf(pupil, 0) * 0.25f) * es_value_noise(seed, 0.08 * time, 3);
     float high = 0;
     for (uint32_t i = 0; i < TONES; i++) { /* between 1.4 and 2.0 Hz: their beats stay inside of the band */
         const double frequency = 1.4 + 0.6 * ((double)i + (double)es_random_float(seed ^ 0x51u, i)) / TONES;
         high += sine_of_turns(frequency * time + (double)es_random_float(seed ^ 0x52u, i));
     }
-    return low + 0.006f * high;
+    return low + 0.05f * high;
 }
 
 /* ---- mass-spring system ---------------------------------------------------------------------------------------------------------------- */
@@ -160,7 +161,7 @@ void es_lens_add_particles(const es_lens* lens, es_eye_shapes* shapes)
 
 void es_lens_add_gratings(const es_lens* lens, es_eye_shapes* shapes)
 {
-    const float half = 0.15f * lens->period;
+    const float half = 0.16f * lens->period;
     for (uint32_t i = 0; i < ES_LENS_GRATINGS; i++) {
         const es_lens_grating* g = &lens->gratings[i];
         const float inner = es_lens_radius_at(lens, g->inner), outer = es_lens_radius_at(lens, g->outer);

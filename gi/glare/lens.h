@@ -11,7 +11,7 @@
 
 #include "gi/glare/eye_shapes.h"
 
-enum { ES_LENS_GRID = 17, ES_LENS_PARTICLES = 750, ES_LENS_GRATINGS = 200, ES_GRATING_LINES = 3 };
+enum { ES_LENS_GRID = 17, ES_LENS_PARTICLES = 750, ES_LENS_GRATINGS = 200, ES_GRATING_LINES = 4 };
 
 #define ES_LENS_RADIUS 4.8f     /* mm */
 #define ES_LENS_THICKNESS 4.0f  /* mm, on the axis */

@@ -8,7 +8,7 @@
 
 #include "gi/glare/eye_shapes.h"
 
-enum { ES_VITREOUS_PARTICLES = 640 };
+enum { ES_VITREOUS_PARTICLES = 540 };
 
 #define ES_VITREOUS_RADIUS 8.0f /* mm */
 #define ES_VITREOUS_PARTICLE 0.035f /* mm, radius of each */
