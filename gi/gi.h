@@ -74,11 +74,12 @@ typedef enum es_micro_light {
     ES_MICRO_LIGHT_PHOTONS     /* photons from the lights, their density at the points (§6.4.4) */
 } es_micro_light;
 
-/* What mirrors and glossy things show of what is around them. */
-typedef enum es_reflections_method {
-    ES_REFLECTIONS_NONE,  /* lights alone: as highlights of spot, point and directional ones, and of lamps and indirect light through lobes widened to lamp_roughness and lobe_roughness */
-    ES_REFLECTIONS_MAPS   /* a picture: each reflecting thing has a prefiltered cube map of its surroundings (Ritschel thesis §7.5.3), looked up from where rays meet what it shows */
-} es_reflections_method;
+/* How light spreads in the eye that looks at the picture. */
+typedef enum es_glare_method {
+    ES_GLARE_OFF,
+    ES_GLARE_CONVOLUTION, /* the picture, convolved with the spectrum of the eye's aperture (Ritschel thesis §8.4.4) */
+    ES_GLARE_BILLBOARDS   /* the spectrum, added about the brightest places (fig. 8.10): cheap, and needles of large lights are as sharp as those of points */
+} es_glare_method;
 
 typedef enum es_tone_map { ES_TONE_MAP_REINHARD, ES_TONE_MAP_PBR_NEUTRAL, ES_TONE_MAP_LINEAR } es_tone_map;
 
@@ -142,11 +143,6 @@ typedef struct es_renderer_settings {
                                       * point lights or micro-buffers, and composited; of more than that the nearest count. 0: they are drawn as masked, as light meets them
                                       * with any setting. Of surfaces at the very same depth one is seen; the side turned to the eye is lit. What screen space and rays find
                                       * besides (screen_*, compensation_*, COMPENSATED) they are not lit by, and images of surfaces (depth, normal, motion …) show what is behind */
-    /* reflections: at pixels that reflect they take the place of what lobes reflect of lamps and of indirect light; highlights of lights without a size stay */
-    uint32_t reflections;            /* es_reflections_method */
-    float reflection_roughness;      /* surfaces whose lobe is at most so wide reflect, 0 … 1 */
-    uint32_t reflection_maps;        /* MAPS: things that have one, at most; those that look largest from the camera, by their bounds. Others reflect as with NONE */
-    uint32_t reflection_size;        /* MAPS: texels of a face's side, a power of two */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */
@@ -172,6 +168,16 @@ typedef struct es_renderer_settings {
                                       * used to. Goes by the world's time. 0: the exposure is what `exposure` says, otherwise that is added to it */
     float exposure_key;              /* exposure_adapt: radiance times exposure that the picture's logarithmic mean is shown as */
     /* glare: the eye that looks at the picture (Ritschel thesis §8.2, table 8.1; gi/glare/eye.h). Parts that are off scatter nothing, what has a strength of 0 stays still */
+    uint32_t glare;                  /* es_glare_method; every channel's sum over the picture stays what it is (gi/glare/convolution.h) */
+    uint32_t glare_size;             /* pixels of a side of the aperture and of its power spectrum, 64 … 4096, a power of two */
+    float glare_width;               /* side of the plane that the aperture is drawn in, mm. Light goes up to 575 nm size / (2 width) aside; what is outside of the plane is dark */
+    float glare_field;               /* angle of the eye's view that the picture's width spans, degrees (the thesis' study: 10) */
+    uint32_t glare_wavelengths;      /* of 380 … 770 nm (§8.4.3: 32) */
+    uint32_t glare_supersample;      /* 1, 2, 4, 8: places per pixel of the aperture and dimension (§8.4.1: 2) */
+    float glare_defocus;             /* dioptres; 0: Fraunhofer's diffraction, otherwise Fresnel's (§8.4.2) */
+    uint32_t glare_cycle;            /* spectra that are made once and shown over and over, 30 a second, there and back again (§8.4.4); 0: each frame has its own */
+    float glare_threshold;           /* BILLBOARDS: radiance above which light spreads, W/(m² sr) */
+    uint32_t glare_billboards;       /* BILLBOARDS: at most so many, each for a tile of 16 × 16 pixels */
     uint32_t glare_seed;             /* of the subject's anatomy, and of what moves it */
     float glare_pupil;               /* mean diameter, mm; below 0: by the field's luminance (eq. 8.2) */
     float glare_hippus;              /* amplitude of the noise by which it fluctuates (eq. 8.1) */

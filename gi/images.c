@@ -11,9 +11,9 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_NEGATIVE, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_REFLECTIONS, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_NEGATIVE, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
-    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_OPACITY, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
+    IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_OPACITY, IMAGE_GLARE, IMAGE_GLARE_SPECTRUM, IMAGE_APERTURE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
 
 static const struct { image_kind kind; const char *name, *description; } images[] = {
@@ -32,7 +32,6 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_RESIDUAL, "compensation-1", "of the indirect light, what the first of compensation.steps finds, W/(m² sr); compensation-2 … compensation-4 likewise"},
     {IMAGE_OCCLUSION, "occlusion", "share of the environment's light that lamps screen or ambient find to be kept away, mean over channels, 0 to 1"},
     {IMAGE_SCREEN_BOUNCE, "screen-bounce", "of the indirect light, what screen.bounce finds in screen space, W/(m² sr)"},
-    {IMAGE_REFLECTIONS, "reflections", "of the indirect light, what reflecting surfaces see, W/(m² sr): lamps and the environment are in it as well"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
     {IMAGE_NORMAL, "normal", "world shading normal"},
     {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},
@@ -52,6 +51,9 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_IMPORTANCE, "importance", "where the first light's virtual point lights go (Knecht eq. 4.3)"},
     {IMAGE_ISM, "ism", "the first 64 shadow maps of the virtual point lights, 0 near, 1 far or empty"},
     {IMAGE_OPACITY, "opacity", "share of what is behind blended surfaces that they hide, 0 to 1; 0 where there are none"},
+    {IMAGE_GLARE, "glare", "radiance as the eye sees it that looks at the picture, W/(m² sr); without glare that itself"},
+    {IMAGE_GLARE_SPECTRUM, "glare-spectrum", "where light of a pixel goes in that eye, as pixels of the picture; each channel sums to 1"},
+    {IMAGE_APERTURE, "aperture", "the plane of that eye's pupil: the share of light that each place lets through, 0 to 1"},
     {IMAGE_MICRO, "micro-buffer", "of the pixel in the middle: its lobe's where it has one"},
     {IMAGE_MICRO_UNWARPED, "micro-buffer-unwarped", "the same laid out over the hemisphere, the normal in the middle"},
     {IMAGE_MICRO_DISTANCE, "micro-buffer-distance", "how far away is what the micro-buffer shows, metres; 0 where nothing is"},
@@ -195,8 +197,9 @@ static es_result put_composed(es_renderer* renderer, image_kind kind, es_image* 
         memset(job.direct, 0, sizeof job.direct);
         memset(job.layers.direct, 0, sizeof job.layers.direct);
     }
-    if (kind != IMAGE_DISPLAY && kind != IMAGE_RADIANCE) memset(job.finished, 0, sizeof job.finished);
-    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE ? job.radiance : kind == IMAGE_DIRECT || kind == IMAGE_LAMPS ? job.whole_direct : kind == IMAGE_EMISSION ? job.emitted : kind == IMAGE_BOUNDED ? job.bounded : job.indirect;
+    if (kind == IMAGE_DISPLAY || kind == IMAGE_GLARE) es_glare_compose(renderer, &job);
+    if (kind != IMAGE_DISPLAY && kind != IMAGE_RADIANCE && kind != IMAGE_GLARE) memset(job.finished, 0, sizeof job.finished);
+    float** target = kind == IMAGE_DISPLAY ? job.display : kind == IMAGE_RADIANCE || kind == IMAGE_GLARE ? job.radiance : kind == IMAGE_DIRECT || kind == IMAGE_LAMPS ? job.whole_direct : kind == IMAGE_EMISSION ? job.emitted : kind == IMAGE_BOUNDED ? job.bounded : job.indirect;
     for (int k = 0; k < 3; k++) {
         target[k] = planes.at[k];
         if (kind == IMAGE_INDIRECT_UNFILTERED) {
@@ -311,11 +314,16 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     } else if (kind == IMAGE_ISM && shown_maps) {
         width = renderer->maps.size * ISM_COLUMNS;
         height = renderer->maps.size * ((shown_maps + ISM_COLUMNS - 1) / ISM_COLUMNS);
-    } else if (of_light || kind == IMAGE_SHADOW_MAP || kind == IMAGE_ISM) {
+    } else if (kind == IMAGE_APERTURE && renderer->glare.aperture.transmittance) {
+        width = height = renderer->glare.aperture.size;
+    } else if (kind == IMAGE_GLARE_SPECTRUM && renderer->glare.current) {
+        width = 2 * renderer->glare.current->reach_x + 1;
+        height = 2 * renderer->glare.current->reach_y + 1;
+    } else if (of_light || kind == IMAGE_SHADOW_MAP || kind == IMAGE_ISM || kind == IMAGE_APERTURE || kind == IMAGE_GLARE_SPECTRUM) {
         width = height = 8; /* a black image: the frame has no such thing */
         light = NULL;
     }
-    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION || kind == IMAGE_OPACITY;
+    bool single = kind == IMAGE_DEPTH || (kind >= IMAGE_METALLIC && kind <= IMAGE_SHADOW_MAP) || kind == IMAGE_IMPORTANCE || kind == IMAGE_ISM || kind == IMAGE_CONFIDENCE || kind == IMAGE_OCCLUSION || kind == IMAGE_OPACITY || kind == IMAGE_APERTURE;
     if (single) channels = 1;
     if (kind == IMAGE_MOTION) channels = 2;
     es_result result = es_image_create(context, width, height, channels, image);
@@ -325,6 +333,7 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     switch (kind) {
     case IMAGE_DISPLAY:
     case IMAGE_RADIANCE:
+    case IMAGE_GLARE:
     case IMAGE_EMISSION:
     case IMAGE_DIRECT:
     case IMAGE_LAMPS:
@@ -337,10 +346,9 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_COMPENSATION:
     case IMAGE_NEGATIVE:
     case IMAGE_RESIDUAL:
-    case IMAGE_REFLECTIONS:
     case IMAGE_SCREEN_BOUNCE: {
         es_compose_job job = es_renderer_compose_job(renderer);
-        const float* const* planes = kind == IMAGE_REFLECTIONS ? job.mirrored : kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : kind == IMAGE_NEGATIVE ? ES_FURTHER_NEGATIVE : kind == IMAGE_RESIDUAL ? ES_FURTHER_RESIDUAL + step_of(name) - 1 : ES_FURTHER_BOUNCE];
+        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : kind == IMAGE_NEGATIVE ? ES_FURTHER_NEGATIVE : kind == IMAGE_RESIDUAL ? ES_FURTHER_RESIDUAL + step_of(name) - 1 : ES_FURTHER_BOUNCE];
         const bool summand = kind != IMAGE_IRRADIANCE && kind != IMAGE_BACKGROUND;
         if (planes[0] && summand) put_behind(planes, &job.layers, g->stride, image);
         else if (planes[0]) put_planes(planes, g->stride, image);
@@ -351,6 +359,12 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
         put_opacity(&job.layers, g->stride, image);
         break;
     }
+    case IMAGE_APERTURE:
+        if (renderer->glare.aperture.transmittance) memcpy(image->pixels, renderer->glare.aperture.transmittance, (size_t)width * height * sizeof(float));
+        break;
+    case IMAGE_GLARE_SPECTRUM:
+        if (renderer->glare.current) put_planes((const float* const*)renderer->glare.current->at, (uint32_t)renderer->glare.current->stride, image);
+        break;
     case IMAGE_OCCLUSION: es_screen_occlusion_image(renderer, image->pixels); break;
     case IMAGE_CONFIDENCE: result = put_confidence(renderer, image); break;
     case IMAGE_ALBEDO: put_albedo(g, 0, image); break;

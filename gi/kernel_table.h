@@ -26,7 +26,6 @@
 #include "gi/micro/upsample.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
-#include "gi/reflections/reflecting.h"
 #include "gi/screen/directional_occlusion.h"
 #include "gi/screen/residual.h"
 #include "gi/screen/screen_bounce.h"
@@ -85,6 +84,7 @@
     X(fft_columns, (const es_fft_columns_job* job, uint32_t begin, uint32_t end, float* scratch))                \
     X(fft_rows, (const es_fft_rows_job* job, uint32_t begin, uint32_t end, float* scratch))                      \
     /* gi/glare/diffraction.h: groups of eight rows of the spectrum; scratch of es_chromatic_scratch floats */     \
+    X(fade, (const es_fade_job* job, uint32_t row_begin, uint32_t row_end))                                      \
     X(chromatic, (const es_chromatic_job* job, uint32_t begin, uint32_t end, float* scratch))                    \
     /* gi/glare/convolution.h: rows, and whether each strip of their columns is dark; rows */                    \
     X(glare_load, (const es_glare_load_job* job, uint32_t row_begin, uint32_t row_end, uint8_t* dark))           \
@@ -113,12 +113,6 @@
     /* rows [row_begin, row_end) of a level */                                                                    \
     X(environment_lobes, (const es_environment_lobe_job* job, uint32_t row_begin, uint32_t row_end))              \
     X(environment_irradiance, (const es_environment_irradiance_job* job, uint32_t row_begin, uint32_t row_end))   \
-    /* gi/reflections/reflection_map.h: rows of the face, of all six faces of the level, one after another */      \
-    X(reflection_face, (const es_reflection_face_job* job, uint32_t row_begin, uint32_t row_end))                  \
-    X(reflection_lobe, (const es_reflection_lobe_job* job, uint32_t row_begin, uint32_t row_end))                  \
-    X(reflection_ask, (const es_reflection_atlas* atlas, const es_reflection_question* question))                  \
-    X(reflecting, (const es_reflecting_job* job, uint32_t row_begin, uint32_t row_end))                            \
-    X(reflected, (const es_reflected_job* job, uint32_t row_begin, uint32_t row_end))                              \
     X(background, (const es_background_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(environment_ask, (const es_environment_lookup* lookup, const es_environment_question* question))
 

@@ -7,6 +7,7 @@
 #include "gi/environment.h"
 #include "gi/exposure.h"
 #include "gi/filter.h"
+#include "gi/glare/glare_pass.h"
 #include "gi/half_resolution.h"
 #include "gi/history.h"
 #include "gi/ism.h"
@@ -18,7 +19,6 @@
 #include "gi/micro/micro.h"
 #include "gi/plan.h"
 #include "gi/reference/scene.h"
-#include "gi/reflections/reflections.h"
 #include "gi/scene_points.h"
 #include "gi/second_order.h"
 #include "gi/screen/buffers.h"
@@ -114,7 +114,6 @@ struct es_renderer {
     es_screen_buffers screen;
     es_blend_lists lists;      /* of the frame that is being rendered */
     es_blend_layers blend;
-    es_reflections reflections;
 
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;
@@ -130,6 +129,7 @@ struct es_renderer {
     es_planes radiance;        /* of the picture, where something reads it before it is shown and anti-aliasing has not made it */
     es_meter metered;          /* valid when the pass is */
     es_exposure exposure;
+    es_glare glare;
     es_arena arena;            /* of the pass that runs */
     uint32_t* display;         /* 0x00RRGGBB */
     es_srgb_table srgb;

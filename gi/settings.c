@@ -1,7 +1,6 @@
 /* The renderer's settings: names, ranges, defaults. What a number means and where it comes from stands in gi.h. */
 #include "gi/gi.h"
 #include "gi/layer_light.h"
-#include "gi/reflections/reflection_map.h"
 #include "gi/screen/residual.h"
 #include "platform/settings.h"
 
@@ -109,11 +108,6 @@ static const es_setting renderer_table[] = {
 
     {"blend.layers", ES_SETTING_INT, "4", 0, ES_BLEND_MAX_LAYERS, NULL, "blended surfaces in front of the picture that are peeled from it, lit and composited; of more the nearest; 0: they are drawn as masked", AT(blend_layers)},
 
-    {"reflections", ES_SETTING_CHOICE, "none", 0, 0, "none|maps", "what mirrors and glossy things show of what is around them: nothing but highlights of lights, or a picture, looked up in a cube map of each thing's surroundings", AT(reflections)},
-    {"reflections.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "surfaces of at most this roughness reflect a picture", AT(reflection_roughness)},
-    {"reflections.maps", ES_SETTING_INT, "8", 1, ES_REFLECTION_MOST_MAPS, NULL, "reflections maps: things that have a map, at most; those that look largest", AT(reflection_maps)},
-    {"reflections.size", ES_SETTING_INT, "256", 16, 1024, NULL, "reflections maps: texels of a side of each of a map's six faces, a power of two", AT(reflection_size)},
-
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},
     {"temporal.base", ES_SETTING_FLOAT, "0.9", 0, 0.999, NULL, "confidence in last frame's light where nothing changes", AT(temporal_base)},
@@ -131,6 +125,16 @@ static const es_setting renderer_table[] = {
     {"antialias.samples", ES_SETTING_INT, "16", 1, 64, NULL, "places inside a pixel that are sampled", AT(antialias_samples)},
     {"antialias.blend", ES_SETTING_FLOAT, "0.1", 0.01, 1, NULL, "antialias temporal: share of the new frame where things move", AT(antialias_blend)},
 
+    {"glare", ES_SETTING_CHOICE, "off", 0, 0, "off|convolution|billboards", "light spreads in the eye that looks at the picture: all of it, or that of the brightest places", AT(glare)},
+    {"glare.size", ES_SETTING_INT, "512", 64, 4096, NULL, "glare: pixels of the aperture's side, a power of two; more reaches further", AT(glare_size)},
+    {"glare.width", ES_SETTING_FLOAT, "9", 1, 20, NULL, "glare: side of the plane that the aperture is drawn in, mm; less reaches further, and what is outside is dark", AT(glare_width)},
+    {"glare.field", ES_SETTING_FLOAT, "10", 0.1, 170, NULL, "glare: degrees of the eye's view that the picture's width spans", AT(glare_field)},
+    {"glare.wavelengths", ES_SETTING_INT, "32", 1, 64, NULL, "glare: of 380 to 770 nm", AT(glare_wavelengths)},
+    {"glare.supersample", ES_SETTING_INT, "2", 1, 8, NULL, "glare: n of n × n places that a pixel of the aperture is drawn at: 1, 2, 4 or 8", AT(glare_supersample)},
+    {"glare.defocus", ES_SETTING_FLOAT, "0", -3, 3, NULL, "glare: dioptres that the eye's lens is off; 0: sharp", AT(glare_defocus)},
+    {"glare.cycle", ES_SETTING_INT, "0", 0, 256, NULL, "glare: spectra that are made once and shown 30 a second, there and back again; 0: each frame has its own", AT(glare_cycle)},
+    {"glare.threshold", ES_SETTING_FLOAT, "10", 0, 1000000, NULL, "glare billboards: radiance above which light spreads", AT(glare_threshold)},
+    {"glare.billboards", ES_SETTING_INT, "256", 0, 4096, NULL, "glare billboards: at most so many", AT(glare_billboards)},
     {"glare.seed", ES_SETTING_INT, "0", 0, 1000000, NULL, "glare: whose eye it is", AT(glare_seed)},
     {"glare.pupil", ES_SETTING_FLOAT, "-1", -1, 9, NULL, "glare: mean diameter of the pupil, mm; below 0: by the field's luminance", AT(glare_pupil)},
     {"glare.hippus", ES_SETTING_FLOAT, "0.125", 0, 1, NULL, "glare: how the pupil fluctuates; 0: not", AT(glare_hippus)},

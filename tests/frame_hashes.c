@@ -10,7 +10,7 @@
  * `half-temporal` and `temporal` blend light with that of the frame before, `antialiased` the picture as well;
  * `bounces`, `one-pass` and `reflective` have three bounces by rays, by maps and by reflective maps after a step; `moving` are the scenes
  * that move by themselves, with the hash of the world's state after a second; `blended` and `micro-blended` see through three materials of
- * `parts`; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
+ * `parts`, and `glare` and `billboards` look at that with an eye; `traced` and `unbounded` trace rays to the virtual lights, `compensated` does after a step that the hierarchy is refit for.
  *
  * usage: frame_hashes [--threads N] [--isa NAME] [--no-skip] [--write DIR] [SCENE …]
  *        frame_hashes --isas | --scenes
@@ -449,6 +449,19 @@ static void print_frames(es_context* context, const plan* p, bool skip, const ch
         settings.height = p->height;
         check(context, es_renderer_configure(renderer, &settings), "blending");
         print_images(context, renderer, world, p->name, "blended", folder);
+        settings.glare = ES_GLARE_CONVOLUTION;
+        settings.glare_size = 128;
+        settings.glare_field = 3;
+        check(context, es_renderer_configure(renderer, &settings), "looking at it with an eye");
+        print_images(context, renderer, world, p->name, "glare", folder);
+        settings.glare = ES_GLARE_BILLBOARDS;
+        settings.glare_cycle = 3;
+        settings.glare_defocus = 0.25f;
+        settings.glare_threshold = 0.5f;
+        settings.glare_billboards = 5;
+        check(context, es_renderer_configure(renderer, &settings), "billboards");
+        check(context, es_world_step(world, 1.0f / 30), "a step");
+        print_images(context, renderer, world, p->name, "billboards", folder);
     }
 
     es_renderer_destroy(renderer);

@@ -78,6 +78,27 @@ es_result es_diffraction_update(es_context* context, const es_aperture* aperture
     return ES_OK;
 }
 
+typedef struct fade_loop { const es_gi_kernels* kernels; const es_fade_job* job; } fade_loop;
+
+static void fade_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
+{
+    const fade_loop* loop = user;
+    loop->kernels->fade(loop->job, begin, end);
+}
+
+void es_diffraction_fade(es_context* context, es_diffraction* d)
+{
+    float* sums = d->power + d->stride * d->size; /* the room of the transform */
+    const es_fade_job job = {d->power, d->stride, d->size, sums};
+    fade_loop loop = {es_gi_kernel_table(es_context_isa(context)), &job};
+    es_parallel_for(context, d->size, 16, fade_rows, &loop);
+    d->paired = 0;
+    for (uint32_t y = 1; y < d->size; y++) d->paired += (double)sums[y];
+    if (d->paired > 0) return;
+    d->power[d->size / 2 * d->stride + d->size / 2] = 1.0f;
+    d->paired = 1;
+}
+
 es_result es_diffraction_image(es_context* context, const es_image* transmittance, float width, float defocus, es_image* power)
 {
     *power = (es_image){0};

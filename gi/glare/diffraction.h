@@ -35,6 +35,9 @@ typedef struct es_diffraction {
  * zero but frequency (0, 0), which is 1. `defocus` in dioptres; the phase turns by less than half a turn from pixel to pixel while
  * |defocus| < lambda size / (2 r width), r the pupil's radius: beyond, it folds over. The same bits for any number of threads. */
 es_result es_diffraction_update(es_context* context, const es_aperture* aperture, float defocus, es_diffraction* diffraction);
+/* Lets the spectrum fade away towards a circle round the middle, as wide as it is, from half of its radius on: the square that the aperture's pixels can tell of is nothing of
+ * the eye's, and would show about bright lights. What is left is what colours are made of and sums to 1; `total` stays. */
+void es_diffraction_fade(es_context* context, es_diffraction* diffraction);
 void es_diffraction_free(es_context* context, es_diffraction* diffraction);
 
 /* ---- colours ---------------------------------------------------------------------------------------------------------------------------- */
@@ -92,6 +95,8 @@ typedef struct es_chromatic_job {
     float* to[3];                      /* rows up to a multiple of eight */
     size_t stride;
 } es_chromatic_job;
+
+typedef struct es_fade_job { float* power; size_t stride; uint32_t size; float* sums; /* of each row */ } es_fade_job;
 
 /* Floats that it wants as scratch. */
 static inline size_t es_chromatic_scratch(uint32_t size, size_t stride) { return 8 * (size + 3 * stride); }

@@ -6,6 +6,25 @@
 #include "gi/kernel_table.h"
 #include "platform/simd.h"
 
+void ES_KERNEL(es_gi_fade)(const es_fade_job* job, uint32_t row_begin, uint32_t row_end)
+{
+    const float radius = 0.5f * (float)job->size, scale = 1.0f / (radius * radius);
+    for (uint32_t y = row_begin; y < row_end; y++) {
+        float* row = job->power + y * job->stride;
+        const vf down = vf_set1((float)y - radius);
+        vf sum = vf_zero();
+        for (uint32_t x = 0; x < job->size; x += VW) {
+            const vf across = vf_from_int(vi_set1((int32_t)x) + vi_iota()) - vf_set1(radius);
+            /* from a quarter of the squared radius to all of it */
+            const vf t = vf_clamp((vf_set1(1.0f) - (across * across + down * down) * vf_set1(scale)) * vf_set1(4.0f / 3.0f), vf_zero(), vf_set1(1.0f));
+            const vf faded = vf_load(row + x) * (t * t * (vf_set1(3.0f) - t - t));
+            vf_store(row + x, faded);
+            sum = sum + faded;
+        }
+        job->sums[y] = vf_sum(sum);
+    }
+}
+
 /* Columns of the power spectrum, summed for rows first … first + 7 of the pixels: lanes are rows. */
 VINL void sum_columns(const es_chromatic_job* job, const es_spectral_band* band, uint32_t first, uint32_t end, float* to)
 {
