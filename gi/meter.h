@@ -14,7 +14,7 @@
 typedef struct es_meter_row { float sum, log_sum; } es_meter_row;
 
 typedef struct es_meter_job {
-    const float* radiance[3];  /* W/(m² sr); pixels that are no number count as black, others within 0 … ES_METER_MOST */
+    const float* radiance[3];  /* W/(m² sr); pixels that are no number, infinite or negative count as black, others as ES_METER_MOST at the most */
     uint32_t width, height, stride; /* floats of a row; readable up to the next multiple of eight after width */
     es_meter_row* rows;        /* height of them */
 } es_meter_job;

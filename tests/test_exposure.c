@@ -65,7 +65,8 @@ static void test_meter(void** state)
         p.at[2][3] = -INFINITY;
         assert_true(metered(context, &p).luminance == 0.0f);
         p.at[0][3] = 0;
-        p.at[1][STRIDE + 5] = INFINITY;
+        p.at[2][STRIDE + 9] = INFINITY;
+        p.at[1][STRIDE + 5] = 1e30f;
         meter = metered(context, &p);
         assert_near((double)meter.luminance, 179 * 0.7152 * (double)ES_METER_MOST / (WIDTH * HEIGHT), 1e5);
         expect_same_bits(&same, &meter, sizeof meter);

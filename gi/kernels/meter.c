@@ -2,10 +2,11 @@
 #include "gi/kernel_table.h"
 #include "platform/simd_maths.h"
 
-/* 0 where `a` is no number or negative */
+/* 0 where `a` is no number, infinite or negative: asked of its bits, as comparing what is no number is an invalid operation */
 VINL vf bounded(vf a)
 {
-    a = vf_select(vm_gt(a, vf_zero()), a, vf_zero());
+    const vi bits = vi_from_bits(a);
+    a = vf_and(vi_gt(bits, vi_zero()) & vi_lt(bits, vi_set1(0x7f800000)), a);
     return vf_min(a, vf_set1(ES_METER_MOST));
 }
 
