@@ -42,6 +42,7 @@ typedef struct demo_options {
     const char *record, *replay; /* files */
     const char* environment;     /* file; NULL */
     double environment_rotation, environment_intensity;
+    const char* edits;               /* file; NULL: those the scene has */
     const char* recorded_settings; /* of the file that is replayed: key=value between blanks, in place of the scene's own; NULL */
     bool reference; /* the command is `reference`; the texts below are values of its settings, NULL when not given */
     const char *spp, *seconds, *error, *bounces;
@@ -98,7 +99,7 @@ typedef struct demo_session {
 } demo_session;
 
 int demo_session_open(const demo_options* options, demo_session* session);
-/* es_world_open, and what --environment says; the message is the context's. */
+/* es_world_open, and what --environment and, of the scene that was asked for, --edits say; the message is the context's. */
 es_result demo_open_world(es_context* context, const demo_options* options, const char* scene, const es_world_settings* settings, es_world** world);
 /* The context alone. */
 int demo_session_open_context(const demo_options* options, demo_session* session);

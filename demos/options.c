@@ -84,9 +84,9 @@ static int parse_method(const char* text, demo_options* options)
     return demo_refuse("--gi %s: none, ism, classic, vpl-traced, vpl-sampled, micro or second-order is expected", text);
 }
 
-enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, RECORD, REPLAY, ENVIRONMENT, ROTATION, INTENSITY, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
+enum option_id { OUT, SIZE, FRAMES, FPS, THREADS, ISA, NO_SKIP, GI, SET, IMAGE, HASH, STATS, RECORD, REPLAY, ENVIRONMENT, ROTATION, INTENSITY, EDITS, SPP, SECONDS, ERROR, BOUNCES, RESUME, OPTION_COUNT };
 static const char* const option_names[OPTION_COUNT] = {"--out", "--size", "--frames", "--fps", "--threads", "--isa", "--no-skip", "--gi", "--set",
-    "--image", "--hash", "--stats", "--record", "--replay", "--environment", "--environment-rotation", "--environment-intensity", "--spp", "--seconds", "--error", "--bounces", "--resume"};
+    "--image", "--hash", "--stats", "--record", "--replay", "--environment", "--environment-rotation", "--environment-intensity", "--edits", "--spp", "--seconds", "--error", "--bounces", "--resume"};
 
 static bool belongs_to(enum option_id id, bool reference)
 {
@@ -152,6 +152,9 @@ static int apply_option(enum option_id id, const char* value, demo_options* opti
     case INTENSITY:
         if (demo_parse_double(value, 0, 1e6, &options->environment_intensity)) return DEMO_OK;
         return demo_refuse("--environment-intensity %s: a factor from 0 to 1e6 is expected", value);
+    case EDITS:
+        options->edits = value;
+        return DEMO_OK;
     case SPP:
         options->spp = value;
         return DEMO_OK;

@@ -17,10 +17,14 @@ int demo_session_open_context(const demo_options* options, demo_session* session
 es_result demo_open_world(es_context* context, const demo_options* options, const char* scene, const es_world_settings* settings, es_world** world)
 {
     es_result result = es_world_open(context, scene, settings, world);
-    if (result != ES_OK || !options->environment) return result;
-    const float factor = (float)options->environment_intensity;
-    es_environment_desc desc = {.radiance = {factor, factor, factor}, .rotation = (float)options->environment_rotation};
-    result = es_world_load_environment(*world, options->environment, &desc);
+    if (result != ES_OK) return result;
+    if (options->environment) {
+        const float factor = (float)options->environment_intensity;
+        es_environment_desc desc = {.radiance = {factor, factor, factor}, .rotation = (float)options->environment_rotation};
+        result = es_world_load_environment(*world, options->environment, &desc);
+    }
+    const bool asked_for = !options->scene || !strcmp(scene, options->scene); /* the player opens others later */
+    if (result == ES_OK && options->edits && asked_for) result = es_world_load_edits(*world, options->edits);
     if (result == ES_OK) return ES_OK;
     es_world_destroy(*world);
     *world = NULL;

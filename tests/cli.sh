@@ -142,6 +142,16 @@ expect 0 reference cornell --size 64x48 --spp 1 --hash --environment one.hdr
 refused 'missing.exr' render cornell --hash --environment missing.exr
 refused 'lat-long picture is expected' render cornell --hash --environment cube.hdr
 refused 'must have red, green and blue' render cornell --hash --environment depth.exr
+cat >edits.gltf <<'JSON'
+{"asset": {"version": "2.0"}, "scenes": [{"extras": {"earthshine": {"edits": {"constraints": [{"reflecting": {"index": 0, "triangle": 0}, "reflected": {"point": [0, 1, 0]}}]}}}}]}
+JSON
+expect 0 render cornell "${small[@]}" --hash --edits edits.gltf
+expect 0 reference cornell --size 8x8 --spp 1 --hash --edits edits.gltf
+refused 'missing.gltf' render cornell --hash --edits missing.gltf
+echo '{}' >empty.gltf
+refused 'has no edits' render cornell --hash --edits empty.gltf
+sed 's/"index": 0/"node": "nobody"/' edits.gltf >nobody.gltf
+refused "constraints[0].reflecting: there is no node 'nobody'" render cornell --hash --edits nobody.gltf
 refused '--environment-rotation x' render cornell --hash --environment-rotation x
 refused '--environment-intensity -1' render cornell --hash --environment-intensity -1
 refused 'scene' render

@@ -8,7 +8,7 @@
 #include "sim/edits/edit_state.h"
 #include "sim/gltf_file.h"
 
-enum { WHERE = 160, NAME = 512 };
+enum { WHERE = 96, PART = 32, NAME = 512 }; /* of places in the file: those of edits, of parts of edits, and theirs are longer by PART each */
 
 typedef struct reader {
     es_world* world;
@@ -44,11 +44,11 @@ static bool object(reader* r, uint32_t value, const char* where, const char* con
     const es_json* json = r->json;
     if (json->values[value].type != ES_JSON_OBJECT) return refuse(r, where, ": must be an object");
     for (uint32_t i = json->values[value].first; i; i = json->values[i].next) {
-        char name[64];
+        char name[64], shown[ES_GLTF_PRINTABLE];
         es_json_key(json, i, name, sizeof name);
         bool found = false;
         for (const char* const* each = known; *each && !found; each++) found = strcmp(*each, name) == 0;
-        if (!found) es_log(r->world->context, ES_LOG_WARNING, ES_ASSET_WARNING, "%s: %s.%s: no such member is known, it is left out", json->label, where, name);
+        if (!found) es_log(r->world->context, ES_LOG_WARNING, ES_ASSET_WARNING, "%s: %s.%s: no such member is known, it is left out", json->label, where, es_gltf_printable(name, strlen(name), shown));
     }
     return true;
 }
@@ -170,7 +170,8 @@ static bool instance(reader* r, uint32_t value, const char* where, es_instance* 
     }
     out->id = found;
     if (found) return true;
-    if (name[0]) return refuse(r, where, ": there is no node '%.64s' with an instance number %lld", name, (long long)which);
+    char shown[ES_GLTF_PRINTABLE];
+    if (name[0]) return refuse(r, where, ": there is no node '%s' with an instance number %lld", es_gltf_printable(name, strlen(name), shown), (long long)which);
     return refuse(r, where, ": there is no instance number %lld", (long long)index);
 }
 
@@ -191,14 +192,15 @@ static bool named_object(reader* r, uint32_t value, const char* where, const cha
         *out = object->id;
         if (exact) break;
     }
-    return *out || refuse(r, where, ": there is no %s '%.64s'", member, name);
+    char shown[ES_GLTF_PRINTABLE];
+    return *out || refuse(r, where, ": there is no %s '%s'", member, es_gltf_printable(name, strlen(name), shown));
 }
 
 static bool anchor(reader* r, uint32_t owner, const char* name, const char* where_owner, es_anchor* out)
 {
     static const char* const known[] = {"node", "instance", "index", "triangle", "u", "v", "point", NULL};
     const uint32_t value = es_json_member(r->json, owner, name);
-    char where[WHERE];
+    char where[WHERE + 2 * PART];
     *out = (es_anchor){0};
     if (!value) return true;
     snprintf(where, sizeof where, "%s.%s", where_owner, name);
@@ -224,11 +226,11 @@ static bool parameters(reader* r, uint32_t edits, const char* where)
     if (!value) return true;
     if (r->json->values[value].type != ES_JSON_OBJECT) return refuse(r, where, ".parameters: must be an object of numbers");
     for (uint32_t i = r->json->values[value].first; i; i = r->json->values[i].next) {
-        char name[ES_EDIT_NAME + 1];
+        char name[ES_EDIT_NAME], shown[ES_GLTF_PRINTABLE];
         double x;
-        es_json_key(r->json, i, name, sizeof name);
-        if (!name[0] || strlen(name) >= ES_EDIT_NAME) return refuse(r, where, ".parameters: names must have 1 … %d bytes", ES_EDIT_NAME - 1);
-        if (!es_json_number(r->json, i, &x) || !(x >= -(double)ES_WORLD_EXTENT && x <= (double)ES_WORLD_EXTENT)) return refuse(r, where, ".parameters.%s: must be a number within 1e9", name);
+        if (!es_json_key(r->json, i, name, sizeof name) || !name[0]) return refuse(r, where, ".parameters: names must have 1 … %d bytes", ES_EDIT_NAME - 1);
+        es_gltf_printable(name, strlen(name), shown);
+        if (!es_json_number(r->json, i, &x) || !(x >= -(double)ES_WORLD_EXTENT && x <= (double)ES_WORLD_EXTENT)) return refuse(r, where, ".parameters.%s: must be a number within 1e9", shown);
         if (!es_edit_stage_set_parameter(r->world, r->stage, name, (float)x)) return no_memory(r);
     }
     return true;
@@ -253,7 +255,7 @@ static bool region(reader* r, uint32_t value, const char* where)
     if (!drawn) return no_memory(r);
     bool good = true;
     for (uint32_t i = strokes ? r->json->values[strokes].first : 0; i && good; i = r->json->values[i].next) {
-        char at[WHERE];
+        char at[WHERE + PART];
         es_region_stroke* s = &drawn[d.stroke_count];
         snprintf(at, sizeof at, "%s.strokes[%u]", where, d.stroke_count++);
         good = object(r, i, at, stroke_known) && anchor(r, i, "from", at, &s->from) && anchor(r, i, "to", at, &s->to) && single(r, i, "radius", at, 0, 1e9, &s->radius) && flag(r, i, "erase", at, &s->erase);
@@ -281,7 +283,7 @@ static bool parameter(reader* r, uint32_t owner, const char* where_owner, char n
     static const char* const words[] = {"time", "camera", "node", "light", "named", NULL};
     static const char* const axes[] = {"x", "y", "z", NULL};
     const uint32_t value = es_json_member(r->json, owner, "parameter");
-    char where[WHERE];
+    char where[WHERE + PART];
     if (!value) return true;
     snprintf(where, sizeof where, "%s.parameter", where_owner);
     uint32_t kind = 0;
@@ -315,7 +317,7 @@ static bool constraint(reader* r, uint32_t value, const char* where)
     if (!all) return no_memory(r);
     bool good = true;
     for (uint32_t i = keys ? r->json->values[keys].first : 0; i && good; i = r->json->values[i].next) {
-        char at[WHERE];
+        char at[WHERE + PART];
         es_constraint_key* k = &all[d.key_count];
         snprintf(at, sizeof at, "%s.keys[%u]", where, d.key_count++);
         good = object(r, i, at, key_known) && single(r, i, "at", at, -1e9, 1e9, &k->at) && anchor(r, i, "reflecting", at, &k->reflecting) && anchor(r, i, "reflected", at, &k->reflected) &&

@@ -36,6 +36,17 @@ static int hexadecimal(const char* text)
     return value;
 }
 
+/* Bytes of the UTF-8 character at `c`, which a byte that continues none follows; 0 when it is none (RFC 3629). */
+static size_t character_size(const unsigned char* c)
+{
+    if (c[0] < 0x80) return 1;
+    const size_t size = c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : c[0] >= 0xe0 && c[0] < 0xf0 ? 3 : c[0] >= 0xf0 && c[0] < 0xf5 ? 4 : 0;
+    for (size_t i = 1; i < size; i++)
+        if ((c[i] & 0xc0) != 0x80) return 0;
+    if ((c[0] == 0xe0 && c[1] < 0xa0) || (c[0] == 0xed && c[1] > 0x9f) || (c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] > 0x8f)) return 0;
+    return size;
+}
+
 static bool read_string(parser* p)
 {
     for (p->at++;; p->at++) {
@@ -43,6 +54,13 @@ static bool read_string(parser* p)
         unsigned char c = (unsigned char)*p->at;
         if (c == '"') break;
         if (c < 32) return wrong(p, "a control character in a string must be escaped");
+        if (c >= 0x80) {
+            unsigned char bytes[4] = {0};
+            memcpy(bytes, p->at, (size_t)(p->end - p->at) < 4 ? (size_t)(p->end - p->at) : 4);
+            const size_t size = character_size(bytes);
+            if (!size) return wrong(p, "a string must be UTF-8");
+            p->at += size - 1;
+        }
         if (c != '\\') continue;
         if (++p->at == p->end) return wrong(p, "an escape is incomplete");
         if (*p->at == 'u') {
@@ -287,12 +305,10 @@ bool es_json_string(const es_json* json, uint32_t value, char* out, size_t size)
     return v->type == ES_JSON_STRING && unescape(json->text + v->begin + 1, v->end - v->begin - 2, out, size);
 }
 
-void es_json_key(const es_json* json, uint32_t member, char* out, size_t size)
+bool es_json_key(const es_json* json, uint32_t member, char* out, size_t size)
 {
     const es_json_value* v = &json->values[member];
-    unescape(json->text + v->key_begin, v->key_end - v->key_begin, out, size);
-    for (char* c = out; *c; c++)
-        if ((unsigned char)*c < 32 || *c == 127) *c = '?';
+    return unescape(json->text + v->key_begin, v->key_end - v->key_begin, out, size);
 }
 
 /* ---- writing -------------------------------------------------------------------------------------------------------------- */
@@ -316,17 +332,6 @@ void es_json_write(es_json_text* text, const char* format, ...)
     int length = vsnprintf(buffer, sizeof buffer, format, arguments);
     va_end(arguments);
     if (length > 0) es_json_put(text, buffer, (size_t)length < sizeof buffer ? (size_t)length : sizeof buffer - 1);
-}
-
-/* Bytes of the UTF-8 character at `c`, 0 when it is none (RFC 3629). */
-static size_t character_size(const unsigned char* c)
-{
-    if (c[0] < 0x80) return 1;
-    const size_t size = c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : c[0] >= 0xe0 && c[0] < 0xf0 ? 3 : c[0] >= 0xf0 && c[0] < 0xf5 ? 4 : 0;
-    for (size_t i = 1; i < size; i++)
-        if ((c[i] & 0xc0) != 0x80) return 0;
-    if ((c[0] == 0xe0 && c[1] < 0xa0) || (c[0] == 0xed && c[1] > 0x9f) || (c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] > 0x8f)) return 0;
-    return size;
 }
 
 void es_json_write_string(es_json_text* text, const char* string)

@@ -36,8 +36,8 @@ bool es_json_number(const es_json* json, uint32_t value, double* number);
 bool es_json_boolean(const es_json* json, uint32_t value, bool* boolean);
 /* UTF-8 with escapes resolved, zero-terminated; false when it is no string, takes more than `size` bytes or has a zero in it. */
 bool es_json_string(const es_json* json, uint32_t value, char* out, size_t size);
-/* Of a member's name, for messages and to compare: shortened where it does not fit. */
-void es_json_key(const es_json* json, uint32_t member, char* out, size_t size);
+/* The same of a member's name. Where false, out has as much of it as fits. */
+bool es_json_key(const es_json* json, uint32_t member, char* out, size_t size);
 
 /* ---- writing ---------------------------------------------------------------------------------------------------------- */
 

@@ -5,7 +5,7 @@
 # the seeds (seeds/, and what fuzz_seeds writes).
 
 set(fuzz_folder ${CMAKE_SOURCE_DIR}/tests/fuzz)
-set(fuzz_targets hdr settings resume shapes)
+set(fuzz_targets hdr settings resume shapes edits)
 if(EARTHSHINE_WITH_PNG)
   list(APPEND fuzz_targets png)
 endif()
