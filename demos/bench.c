@@ -53,6 +53,7 @@ static const benchmark benchmarks[] = {
     {"time", bench_time, bench_time_rows, false},
     {"rays", bench_rays, bench_rays_rows, false},
     {"fft", bench_fft, bench_fft_rows, false},
+    {"geodesic", bench_geodesic, bench_geodesic_rows, false},
     {"dynamics", bench_dynamics, bench_dynamics_rows, false},
 };
 enum { BENCHMARKS = sizeof benchmarks / sizeof benchmarks[0], MAX_ROWS = 384 };

@@ -131,6 +131,10 @@ bool bench_peer_run_program(bench_peer* peer, size_t program, const char* const*
 int bench_rays(const bench_options* options);
 size_t bench_rays_rows(bench_row* rows, size_t capacity);
 
+/* bench_geodesic.c */
+int bench_geodesic(const bench_options* options);
+size_t bench_geodesic_rows(bench_row* rows, size_t capacity);
+
 /* bench_fft.c */
 int bench_fft(const bench_options* options);
 size_t bench_fft_rows(bench_row* rows, size_t capacity);

@@ -303,6 +303,44 @@ static void test_scale_counts(void** state)
     soup_free(&s);
 }
 
+/* A cut from one edge nearly to the other: the way from side to side leads round its end. */
+static void test_torn_cloth_is_gone_round(void** state)
+{
+    soup s = plane(20, 0);
+    scene c = scene_of(&s, NULL);
+    es_soft_desc desc = es_default_soft_desc();
+    es_soft soft;
+    es_soft_attachment held[441];
+    for (uint32_t i = 0; i < 441; i++) held[i] = (es_soft_attachment){.vertex = i, .in_place = true};
+    desc.mesh = c.mesh;
+    desc.node = c.node;
+    desc.tearable = true;
+    desc.attachments = held;
+    desc.attachment_count = 441;
+    assert_int_equal(es_world_add_soft(c.world, &desc, &soft), ES_OK);
+    const uint32_t count = es_world_mesh(c.world, c.mesh)->vertex_count; /* with those in reserve */
+    float* d = malloc(count * sizeof *d);
+    const uint32_t left = 9, right = 10; /* vertices of the first edge beside the cut, at x = 0.45 and 0.55; the cut is at 0.5 */
+    for (int torn = 0; torn < 2; torn++) {
+        uint32_t triangle = 0;
+        const es_raster_mesh* mesh = es_world_mesh(c.world, c.mesh);
+        while (mesh->indices[3 * triangle] != left && mesh->indices[3 * triangle + 1] != left && mesh->indices[3 * triangle + 2] != left) triangle++;
+        const float u = mesh->indices[3 * triangle + 1] == left, v = mesh->indices[3 * triangle + 2] == left;
+        assert_int_equal(es_world_geodesic(c.world, c.instance, triangle, u, v, ES_GEODESIC_FRONT, 0, d), ES_OK);
+        const float across = d[right + 1];
+        if (!torn) {
+            assert_true(fabsf(across - 0.1f) < 1e-5f);
+            for (int i = 0; i < 17; i++) assert_int_equal(es_world_soft_tear(c.world, soft, (const double[3]){0.5, 0, 0.05 * i}, 0.01f), ES_OK);
+            assert_int_equal(es_world_step(c.world, 1.0f / 60), ES_OK);
+        } else if (across < 1.5f || across > 2.5f) {
+            fail_msg("across the tear it is %g m", (double)across);
+        }
+    }
+    free(d);
+    scene_close(&c);
+    soup_free(&s);
+}
+
 static void test_bits_are_the_same_everywhere(void** state)
 {
     soup s = sphere(24);
@@ -330,6 +368,7 @@ int main(void)
         cmocka_unit_test(test_bounded_fields_are_those_of_all),
         cmocka_unit_test(test_between_is_exact_on_a_triangle),
         cmocka_unit_test(test_scale_counts),
+        cmocka_unit_test(test_torn_cloth_is_gone_round),
         cmocka_unit_test(test_bits_are_the_same_everywhere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

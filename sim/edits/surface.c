@@ -6,6 +6,7 @@
 #include "platform/context.h"
 #include "platform/maths.h"
 #include "platform/random.h"
+#include "sim/soft/soft.h"
 
 /* ---- fans ------------------------------------------------------------------------------------------------------------ */
 
@@ -20,7 +21,25 @@ static void fans_free(es_context* context, es_surface_fans* f)
     *f = (es_surface_fans){0};
 }
 
-/* By the bits of the places at rest, with -0 as 0: what is torn or deformed apart later stays one only where the triangles say so. */
+/* As a cloth's particles are: where it is torn, vertices that were at one place are no longer one. */
+static bool weld_particles(es_context* context, const es_soft_object* soft, es_surface_fans* f)
+{
+    const size_t bytes = (soft->particle_count + (size_t)1) * sizeof(uint32_t);
+    uint32_t* point = es_allocate_zero(context, bytes); /* of each particle, + 1; past them, of vertices that wait to be used */
+    if (!point) return false;
+    for (uint32_t v = 0; v < f->vertex_count; v++) {
+        const uint32_t particle = soft->particle_at[v] < soft->particle_count ? soft->particle_at[v] : soft->particle_count;
+        if (!point[particle]) {
+            f->vertex_of[f->point_count] = v;
+            point[particle] = ++f->point_count;
+        }
+        f->point_of[v] = point[particle] - 1;
+    }
+    es_release(context, point, bytes);
+    return true;
+}
+
+/* By the bits of the places at rest, with -0 as 0. */
 static bool weld(es_context* context, const es_raster_mesh* mesh, es_surface_fans* f)
 {
     const float* rest = mesh->rest_positions ? mesh->rest_positions : mesh->positions;
@@ -114,15 +133,19 @@ static bool make_neighbours(es_context* context, es_surface_fans* f)
     return f->neighbours != NULL;
 }
 
-static bool fans_make(es_context* context, const es_raster_mesh* mesh, es_surface_fans* f)
+static bool fans_make(const es_world* world, const es_mesh_object* object, es_surface_fans* f)
 {
+    es_context* context = world->context;
+    const es_raster_mesh* mesh = &object->raster;
+    const es_soft_object* soft = es_slots_get(&world->slots[ES_OBJECT_SOFT], object->soft);
+    const bool cloth = soft && soft->particle_at;
     const size_t size = mesh->vertex_count + (size_t)1;
     *f = (es_surface_fans){.vertex_count = mesh->vertex_count};
     f->point_of = es_allocate_array(context, size, sizeof(uint32_t));
     if (f->point_of) f->vertex_of = es_allocate_array(context, size, sizeof(uint32_t));
     if (f->vertex_of) f->first_row = es_allocate_array(context, size, sizeof(uint32_t));
     if (f->first_row) f->first_neighbour = es_allocate_array(context, size, sizeof(uint32_t));
-    if (f->first_neighbour && weld(context, mesh, f) && make_rows(context, mesh, f) && make_neighbours(context, f)) return true;
+    if (f->first_neighbour && (cloth ? weld_particles(context, soft, f) : weld(context, mesh, f)) && make_rows(context, mesh, f) && make_neighbours(context, f)) return true;
     fans_free(context, f);
     return false;
 }
@@ -263,7 +286,7 @@ const es_surface* es_surface_of(const es_world* world, es_surfaces* surfaces, co
     surface->raster = &mesh->raster;
     surface->used = ++surfaces->calls;
     if ((parts & ES_SURFACE_FANS) && !(surface->parts & ES_SURFACE_FANS)) {
-        if (!fans_make(context, &mesh->raster, &surface->fans)) return NULL;
+        if (!fans_make(world, mesh, &surface->fans)) return NULL;
         surface->parts |= ES_SURFACE_FANS;
     }
     if ((parts & ES_SURFACE_TREE) && !(surface->parts & ES_SURFACE_TREE)) {

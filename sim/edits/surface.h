@@ -7,7 +7,7 @@
 
 enum { ES_SURFACE_FANS = 1, ES_SURFACE_TREE = 2, ES_SURFACES_KEPT = 16, ES_SURFACE_ROW = 8, ES_SURFACE_LEAF = 4 };
 
-/* Points are vertices that were at one place when the mesh was made, which the seams of texture coordinates and hard edges part. The corners of the triangles
+/* Points are vertices that were at one place when the mesh was made (which the seams of texture coordinates and hard edges part), or that are one particle of a cloth. The corners of the triangles
  * that meet at a point are in rows of eight, those after it in the triangle and those after these; what a row has fewer is the point itself. Triangles of
  * which two corners are one point are left out. */
 typedef struct es_surface_fans {

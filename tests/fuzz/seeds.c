@@ -259,7 +259,7 @@ static void write_shapes(void)
 /* ---- glTF, settings, references -------------------------------------------------------------------------------------------------------- */
 
 /* GLB around a text and 1 KiB of data. */
-static void write_glb(const char* name, const uint8_t* text, size_t size)
+static void write_glb(const char* target, const char* name, const uint8_t* text, size_t size)
 {
     size_t json = (size + 3) / 4 * 4, binary = 1024, total = 12 + 8 + json + 8 + binary;
     uint8_t* glb = calloc(1, total);
@@ -269,7 +269,7 @@ static void write_glb(const char* name, const uint8_t* text, size_t size)
     memset(glb + 20 + size, ' ', json - size);
     memcpy(glb + 20 + json, (uint32_t[]){(uint32_t)binary, 0x004e4942}, 8);
     for (uint32_t i = 0; i < binary / 4; i++) memcpy(glb + 28 + json + 4 * i, &(float){(float)(i * 37 % 17) * 0.25f - 2}, 4);
-    put("gltf", name, glb, total);
+    put(target, name, glb, total);
     free(glb);
 }
 
@@ -334,7 +334,11 @@ int main(int count, char** arguments)
         "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
         "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":9,\"type\":\"VEC3\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":108}],"
         "\"buffers\":[{\"byteLength\":1024}]}";
-    write_glb("triangles.glb", (const uint8_t*)glb_text, sizeof glb_text - 1);
+    write_glb("gltf", "triangles.glb", (const uint8_t*)glb_text, sizeof glb_text - 1);
+    static const char edits_text[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"extras\":{\"earthshine\":{\"edits\":{\"regions\":[{\"type\":\"geodesic\",\"centre\":{\"node\":\"pot\",\"triangle\":2}}],"
+        "\"constraints\":[{\"reflecting\":{\"node\":\"pot\",\"triangle\":2,\"u\":0.5},\"reflected\":{\"point\":[1,2,3]},\"geodesic\":true}]}}}}]}";
+    write_glb("edits", "edits.glb", (const uint8_t*)edits_text, sizeof edits_text - 1);
     if (count == 3) FUZZ_CHECK(nftw(arguments[2], copy_asset, 16, FTW_PHYS) == 0, "%s cannot be read", arguments[2]);
     return 0;
 }
