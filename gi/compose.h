@@ -22,7 +22,7 @@ typedef enum es_further_light {
 
 /* radiance = (emitted + direct) + indirect, the background being emitted,
  * direct = that of light sources without a size + that of lamps,
- * indirect = ((bounded + further[0]) + further[1]) + …, bounded = diffuse + lobe; what is NULL is left out.
+ * indirect = (((bounded + further[0]) + further[1]) + …) + mirrored, bounded = diffuse + lobe; what is NULL is left out.
  * The sums are what stands here, in this order, so that the parts' images add up to the whole's to the bit. Where there are blended layers each of the summands (emitted,
  * direct light of either kind, bounded, every further one) is first composited by itself with those layers: summand · transmittance + the layers'. */
 /* What blended layers leave of the picture behind them, and what they add, weighted (gi/blend.h): planes of the whole picture, of which a rectangle counts. */
@@ -43,6 +43,10 @@ typedef struct es_compose_job {
     const float* specular[3];     /* indirect radiance reflected by the lobe, NULL: none */
     const uint8_t* lit;           /* where that may be lit (gi/lit.h) */
     const float* further[ES_FURTHER_LIGHTS][3]; /* reflected radiance, of either sign; NULL: none */
+    /* what reflecting pixels see (gi/reflections/reflecting.h), added to the indirect light last; it takes the place of what lobes reflect of lamps and indirect light there */
+    const uint32_t* mirrors;      /* not 0: the pixel reflects; NULL: none does */
+    const uint8_t* mirrors_any;   /* where that may be so, as `lit`; NULL: anywhere */
+    const float* mirrored[3];     /* reflected radiance; NULL: none */
     es_compose_layers layers;     /* composited with all but `reflected` */
     const float* finished[3];     /* the radiance itself, in place of all of the above; NULL: it is to be made */
     float exposure_scale;         /* 2^stops */

@@ -74,6 +74,12 @@ typedef enum es_micro_light {
     ES_MICRO_LIGHT_PHOTONS     /* photons from the lights, their density at the points (§6.4.4) */
 } es_micro_light;
 
+/* What mirrors and glossy things show of what is around them. */
+typedef enum es_reflections_method {
+    ES_REFLECTIONS_NONE,  /* lights alone: as highlights of spot, point and directional ones, and of lamps and indirect light through lobes widened to lamp_roughness and lobe_roughness */
+    ES_REFLECTIONS_MAPS   /* a picture: each reflecting thing has a prefiltered cube map of its surroundings (Ritschel thesis §7.5.3), looked up from where rays meet what it shows */
+} es_reflections_method;
+
 /* How light spreads in the eye that looks at the picture. */
 typedef enum es_glare_method {
     ES_GLARE_OFF,
@@ -143,6 +149,11 @@ typedef struct es_renderer_settings {
                                       * point lights or micro-buffers, and composited; of more than that the nearest count. 0: they are drawn as masked, as light meets them
                                       * with any setting. Of surfaces at the very same depth one is seen; the side turned to the eye is lit. What screen space and rays find
                                       * besides (screen_*, compensation_*, COMPENSATED) they are not lit by, and images of surfaces (depth, normal, motion …) show what is behind */
+    /* reflections: at pixels that reflect they take the place of what lobes reflect of lamps and of indirect light; highlights of lights without a size stay */
+    uint32_t reflections;            /* es_reflections_method */
+    float reflection_roughness;      /* surfaces whose lobe is at most so wide reflect, 0 … 1 */
+    uint32_t reflection_maps;        /* MAPS: things that have one, at most; those that look largest from the camera, by their bounds. Others reflect as with NONE */
+    uint32_t reflection_size;        /* MAPS: texels of a face's side, a power of two */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */

@@ -11,7 +11,7 @@
 #include "raster/pack.h"
 
 typedef enum image_kind {
-    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_NEGATIVE, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
+    IMAGE_DISPLAY, IMAGE_RADIANCE, IMAGE_DIRECT, IMAGE_LAMPS, IMAGE_INDIRECT, IMAGE_BOUNDED, IMAGE_BOUNCE, IMAGE_INDIRECT_UNFILTERED, IMAGE_IRRADIANCE, IMAGE_COMPENSATION, IMAGE_NEGATIVE, IMAGE_RESIDUAL, IMAGE_SCREEN_BOUNCE, IMAGE_REFLECTIONS, IMAGE_ALBEDO, IMAGE_NORMAL, IMAGE_GEOMETRIC_NORMAL, IMAGE_DEPTH,
     IMAGE_MOTION, IMAGE_EMISSION, IMAGE_BACKGROUND, IMAGE_METALLIC, IMAGE_ROUGHNESS, IMAGE_SPECULAR, IMAGE_INSTANCE, IMAGE_MATERIAL, IMAGE_TRIANGLE, IMAGE_SHADOW_MAP, IMAGE_LIGHT_ALBEDO, IMAGE_LIGHT_NORMAL,
     IMAGE_IMPORTANCE, IMAGE_ISM, IMAGE_CONFIDENCE, IMAGE_OCCLUSION, IMAGE_OPACITY, IMAGE_GLARE, IMAGE_GLARE_SPECTRUM, IMAGE_APERTURE, IMAGE_MICRO, IMAGE_MICRO_UNWARPED, IMAGE_MICRO_DISTANCE
 } image_kind;
@@ -32,6 +32,7 @@ static const struct { image_kind kind; const char *name, *description; } images[
     {IMAGE_RESIDUAL, "compensation-1", "of the indirect light, what the first of compensation.steps finds, W/(m² sr); compensation-2 … compensation-4 likewise"},
     {IMAGE_OCCLUSION, "occlusion", "share of the environment's light that lamps screen or ambient find to be kept away, mean over channels, 0 to 1"},
     {IMAGE_SCREEN_BOUNCE, "screen-bounce", "of the indirect light, what screen.bounce finds in screen space, W/(m² sr)"},
+    {IMAGE_REFLECTIONS, "reflections", "of the indirect light, what reflecting surfaces see, W/(m² sr): lamps and the environment are in it as well"},
     {IMAGE_ALBEDO, "albedo", "base colour, linear"},
     {IMAGE_NORMAL, "normal", "world shading normal"},
     {IMAGE_GEOMETRIC_NORMAL, "geometric-normal", "world normal of the triangle, turned to the eye"},
@@ -346,9 +347,10 @@ es_result es_renderer_image(es_renderer* renderer, const char* name, es_image* i
     case IMAGE_COMPENSATION:
     case IMAGE_NEGATIVE:
     case IMAGE_RESIDUAL:
+    case IMAGE_REFLECTIONS:
     case IMAGE_SCREEN_BOUNCE: {
         es_compose_job job = es_renderer_compose_job(renderer);
-        const float* const* planes = kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : kind == IMAGE_NEGATIVE ? ES_FURTHER_NEGATIVE : kind == IMAGE_RESIDUAL ? ES_FURTHER_RESIDUAL + step_of(name) - 1 : ES_FURTHER_BOUNCE];
+        const float* const* planes = kind == IMAGE_REFLECTIONS ? job.mirrored : kind == IMAGE_IRRADIANCE ? job.irradiance : kind == IMAGE_BACKGROUND ? job.background : job.further[kind == IMAGE_COMPENSATION ? ES_FURTHER_RAYS : kind == IMAGE_NEGATIVE ? ES_FURTHER_NEGATIVE : kind == IMAGE_RESIDUAL ? ES_FURTHER_RESIDUAL + step_of(name) - 1 : ES_FURTHER_BOUNCE];
         const bool summand = kind != IMAGE_IRRADIANCE && kind != IMAGE_BACKGROUND;
         if (planes[0] && summand) put_behind(planes, &job.layers, g->stride, image);
         else if (planes[0]) put_planes(planes, g->stride, image);

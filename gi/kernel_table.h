@@ -26,6 +26,7 @@
 #include "gi/micro/upsample.h"
 #include "gi/pixel_rays.h"
 #include "gi/reference/bvh.h"
+#include "gi/reflections/reflecting.h"
 #include "gi/screen/directional_occlusion.h"
 #include "gi/screen/residual.h"
 #include "gi/screen/screen_bounce.h"
@@ -113,6 +114,12 @@
     /* rows [row_begin, row_end) of a level */                                                                    \
     X(environment_lobes, (const es_environment_lobe_job* job, uint32_t row_begin, uint32_t row_end))              \
     X(environment_irradiance, (const es_environment_irradiance_job* job, uint32_t row_begin, uint32_t row_end))   \
+    /* gi/reflections/reflection_map.h: rows of the face, of all six faces of the level, one after another */      \
+    X(reflection_face, (const es_reflection_face_job* job, uint32_t row_begin, uint32_t row_end))                  \
+    X(reflection_lobe, (const es_reflection_lobe_job* job, uint32_t row_begin, uint32_t row_end))                  \
+    X(reflection_ask, (const es_reflection_atlas* atlas, const es_reflection_question* question))                  \
+    X(reflecting, (const es_reflecting_job* job, uint32_t row_begin, uint32_t row_end))                            \
+    X(reflected, (const es_reflected_job* job, uint32_t row_begin, uint32_t row_end))                              \
     X(background, (const es_background_job* job, uint32_t row_begin, uint32_t row_end))                            \
     X(environment_ask, (const es_environment_lookup* lookup, const es_environment_question* question))
 

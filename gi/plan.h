@@ -41,6 +41,9 @@
     X(SCREEN_OCCLUSION, "screen-space occlusion", "samples")                                                     \
     X(SCREEN_BOUNCE, "screen-space bounce", "samples")                                                           \
     X(RESIDUAL, "screen-space compensation", "samples")                                                          \
+    X(REFLECTING, "reflected directions", "pixels")                                                              \
+    X(REFLECTION_MAPS, "reflection maps", "maps drawn")                                                          \
+    X(REFLECTIONS, "reflections", "pixels")                                                                      \
     X(BLEND_LAYERS, "blended layers", "triangles")                                                               \
     X(BLEND_LIGHT, "light of blended layers", "pixels")                                                          \
     X(ANTIALIAS, "anti-aliasing", "pixels")                                                                      \

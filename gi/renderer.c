@@ -13,6 +13,7 @@
 #include "gi/lit.h"
 #include "gi/micro_passes.h"
 #include "gi/passes.h"
+#include "gi/reflections/reflection_passes.h"
 #include "gi/screen/passes.h"
 #include "gi/screen/residual_pass.h"
 #include "gi/second_order_pass.h"
@@ -67,6 +68,7 @@ static es_result check_settings(es_context* context, const es_renderer_settings*
     if (!power_of_two(s->ism_size)) return es_fail(context, ES_SETTING_VALUE, "ism.size is %u; 32, 64, 128 and 256 are accepted", s->ism_size);
     if (!power_of_two(s->classic_size)) return es_fail(context, ES_SETTING_VALUE, "classic.size is %u; a power of two from 32 to 1024 is accepted", s->classic_size);
     if (!power_of_two(s->lamp_size)) return es_fail(context, ES_SETTING_VALUE, "lamps.size is %u; 32, 64, 128 and 256 are accepted", s->lamp_size);
+    if (!power_of_two(s->reflection_size)) return es_fail(context, ES_SETTING_VALUE, "reflections.size is %u; a power of two from 16 to 1024 is accepted", s->reflection_size);
     if (s->shadow_size % 8) return es_fail(context, ES_SETTING_VALUE, "shadow.size is %u; a multiple of 8 from 16 to 8192 is accepted", s->shadow_size);
     if (s->bounce_points % 64) return es_fail(context, ES_SETTING_VALUE, "bounce.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->bounce_points);
     if (s->ism_points % 64) return es_fail(context, ES_SETTING_VALUE, "ism.points is %u; a multiple of 64 from 64 to 65536 is accepted", s->ism_points);
@@ -126,6 +128,7 @@ static void free_frame_buffers(es_renderer* renderer)
     es_planes_free(context, &renderer->filtered_specular);
     es_screen_buffers_free(context, &renderer->screen);
     es_blend_layers_free(context, &renderer->blend);
+    es_reflections_free_planes(context, &renderer->reflections);
 }
 
 void es_renderer_destroy(es_renderer* renderer)
@@ -149,6 +152,7 @@ void es_renderer_destroy(es_renderer* renderer)
     es_trace_scene_free(&renderer->trace_scene);
     es_micro_free(context, &renderer->micro);
     es_environment_map_free(context, &renderer->environment);
+    es_reflections_free(context, &renderer->reflections);
     es_blend_lists_free(context, &renderer->lists);
     es_glare_free(context, &renderer->glare);
     es_arena_free(&renderer->arena);
@@ -516,6 +520,7 @@ es_compose_job es_renderer_compose_job(const es_renderer* r)
     es_lamps_compose(r, &job);
     es_screen_compose(r, &job);
     es_blend_compose(r, &job);
+    es_reflections_compose(r, &job);
     for (int k = 0; k < 3; k++) {
         if (r->plan.valid[ES_PASS_BACKGROUND]) job.background[k] = r->background.at[k];
         if (r->plan.valid[ES_PASS_DIRECT]) job.direct[k] = r->direct.at[k];
@@ -547,6 +552,7 @@ static void reads_picture(es_plan* plan, const es_compose_job* job)
     es_screen_reads(plan);
     es_plan_reads_pass(plan, ES_PASS_RESIDUAL);
     es_plan_reads_pass(plan, ES_PASS_SECOND_ORDER);
+    es_reflections_read(plan);
     es_plan_reads_pass(plan, ES_PASS_BLEND_LIGHT);
     es_plan_reads_pass(plan, ES_PASS_ANTIALIAS);
     const uint32_t parts[] = {job->direct[0] != NULL, job->irradiance[0] != NULL, job->specular[0] != NULL, job->lamp_irradiance[0] != NULL, job->lamp_specular[0] != NULL};
@@ -629,6 +635,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_edits(r, in, world);
     if (!result) result = es_pass_background(r, in);
     if (!result) result = es_pass_environment(r, in);
+    if (!result) result = es_pass_reflecting(r, in);
     if (!result) result = es_pass_screen_views(r, in);
     if (!result) result = pass_light_views(r, in);
     if (!result) result = pass_vpls(r, in, world, picture);
@@ -654,6 +661,8 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_screen_occlusion(r, in);
     if (!result) result = es_pass_screen_bounce(r, in);
     if (!result) result = es_pass_residual(r, in);
+    if (!result) result = es_pass_reflection_maps(r, in);
+    if (!result) result = es_pass_reflections(r);
     if (!result) result = es_pass_blend_layers(r, in);
     if (!result) result = es_pass_blend_light(r, in);
     return result ? result : es_pass_antialias(r, picture);

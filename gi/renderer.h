@@ -19,6 +19,7 @@
 #include "gi/micro/micro.h"
 #include "gi/plan.h"
 #include "gi/reference/scene.h"
+#include "gi/reflections/reflections.h"
 #include "gi/scene_points.h"
 #include "gi/second_order.h"
 #include "gi/screen/buffers.h"
@@ -114,6 +115,7 @@ struct es_renderer {
     es_screen_buffers screen;
     es_blend_lists lists;      /* of the frame that is being rendered */
     es_blend_layers blend;
+    es_reflections reflections;
 
     es_planes direct;          /* reflected direct radiance */
     es_planes irradiance, filtered_irradiance;

@@ -1,6 +1,7 @@
 /* The renderer's settings: names, ranges, defaults. What a number means and where it comes from stands in gi.h. */
 #include "gi/gi.h"
 #include "gi/layer_light.h"
+#include "gi/reflections/reflection_map.h"
 #include "gi/screen/residual.h"
 #include "platform/settings.h"
 
@@ -107,6 +108,11 @@ static const es_setting renderer_table[] = {
     {"screen.bounce", ES_SETTING_BOOL, "false", 0, 1, NULL, "light that surfaces within screen.radius send each other, from half as many places: what vpl.bound, then 1 / radius² at the most, leaves out (vpl.spread is 0 then), with gi none all of it; not with gi micro", AT(screen_bounce)},
 
     {"blend.layers", ES_SETTING_INT, "4", 0, ES_BLEND_MAX_LAYERS, NULL, "blended surfaces in front of the picture that are peeled from it, lit and composited; of more the nearest; 0: they are drawn as masked", AT(blend_layers)},
+
+    {"reflections", ES_SETTING_CHOICE, "none", 0, 0, "none|maps", "what mirrors and glossy things show of what is around them: nothing but highlights of lights, or a picture, looked up in a cube map of each thing's surroundings", AT(reflections)},
+    {"reflections.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "surfaces of at most this roughness reflect a picture", AT(reflection_roughness)},
+    {"reflections.maps", ES_SETTING_INT, "8", 1, ES_REFLECTION_MOST_MAPS, NULL, "reflections maps: things that have a map, at most; those that look largest", AT(reflection_maps)},
+    {"reflections.size", ES_SETTING_INT, "256", 16, 1024, NULL, "reflections maps: texels of a side of each of a map's six faces, a power of two", AT(reflection_size)},
 
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},

@@ -54,12 +54,14 @@ VINL void store_rgb(float* const to[3], size_t at, rgb_v c)
 VINL rgb_v load_rgb(const float* const from[3], size_t at) { return (rgb_v){vf_load(from[0] + at), vf_load(from[1] + at), vf_load(from[2] + at)}; }
 VINL rgb_v sum(rgb_v a, rgb_v b) { return (rgb_v){a.r + b.r, a.g + b.g, a.b + b.b}; }
 
-/* Reflected by the diffuse part, `diffuse` being what albedo is multiplied by, and by the lobe. */
-VINL rgb_v reflected(const float* const irradiance[3], const float* const specular[3], bool lobes, rgb_v albedo, vf diffuse, size_t at)
+/* Reflected by the diffuse part, `diffuse` being what albedo is multiplied by, and by the lobe, but in `mirrors`. */
+VINL rgb_v reflected(const float* const irradiance[3], const float* const specular[3], bool lobes, vm mirrors, rgb_v albedo, vf diffuse, size_t at)
 {
     rgb_v c = {vf_zero(), vf_zero(), vf_zero()};
     if (irradiance[0]) c = (rgb_v){albedo.r * diffuse * vf_load(irradiance[0] + at), albedo.g * diffuse * vf_load(irradiance[1] + at), albedo.b * diffuse * vf_load(irradiance[2] + at)};
-    return lobes ? sum(c, load_rgb(specular, at)) : c;
+    if (!lobes) return c;
+    const rgb_v lobe = load_rgb(specular, at);
+    return sum(c, (rgb_v){vf_and(~mirrors, lobe.r), vf_and(~mirrors, lobe.g), vf_and(~mirrors, lobe.b)});
 }
 
 VINL rgb_v behind(rgb_v c, vf transmittance, const float* const layers[3], size_t at)
@@ -84,6 +86,8 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y, bool l
     const vf transmittance = layered ? vf_load(layers->transmittance + at) : vf_set1(1.0f);
     if (layered) c = behind(c, transmittance, layers->emitted, at);
     store_rgb(job->emitted, at, c);
+    const bool reflects = job->mirrors && (!job->mirrors_any || job->mirrors_any[chunk] & 1);
+    const vm mirrors = reflects ? ~vi_eq(vi_load(job->mirrors + at), vi_zero()) : vi_zero();
     const bool lamps = job->lamp_irradiance[0] || job->lamp_specular[0];
     vf diffuse = vf_zero();
     if (job->irradiance[0] || job->lamp_irradiance[0]) diffuse = vf_set1(0.318309886f) * (vf_set1(1.0f) - vf_from_int(surface & vi_set1(0xff)) * vf_set1(1.0f / 255.0f));
@@ -91,7 +95,7 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y, bool l
     rgb_v direct = {vf_zero(), vf_zero(), vf_zero()}, by_lamps = direct;
     if (job->direct[0]) direct = load_rgb(job->direct, at);
     if (lamps) {
-        const rgb_v lit = reflected(job->lamp_irradiance, job->lamp_specular, job->lamp_specular[0] && (!job->lamp_lit || job->lamp_lit[chunk] & 1), albedo, diffuse, at);
+        const rgb_v lit = reflected(job->lamp_irradiance, job->lamp_specular, job->lamp_specular[0] && (!job->lamp_lit || job->lamp_lit[chunk] & 1), mirrors, albedo, diffuse, at);
         by_lamps = (rgb_v){vf_and(~unlit, lit.r), vf_and(~unlit, lit.g), vf_and(~unlit, lit.b)};
     }
     const rgb_v here = lamps ? sum(direct, by_lamps) : direct;
@@ -99,7 +103,7 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y, bool l
     store_rgb(job->whole_direct, at, direct);
     c = sum(c, direct);
 
-    rgb_v indirect = reflected(job->irradiance, job->specular, job->specular[0] && (!job->lit || job->lit[chunk] & 1), albedo, diffuse, at);
+    rgb_v indirect = reflected(job->irradiance, job->specular, job->specular[0] && (!job->lit || job->lit[chunk] & 1), mirrors, albedo, diffuse, at);
     indirect = (rgb_v){vf_and(~unlit, indirect.r), vf_and(~unlit, indirect.g), vf_and(~unlit, indirect.b)};
     store_rgb(job->reflected, at, sum(here, indirect));
     if (layered) indirect = behind(indirect, transmittance, layers->bounded, at);
@@ -108,6 +112,10 @@ VINL rgb_v radiance_at(const es_compose_job* job, uint32_t x, uint32_t y, bool l
         if (!job->further[i][0]) continue;
         const rgb_v further = load_rgb(job->further[i], at);
         indirect = sum(indirect, layered ? scaled(further, transmittance) : further);
+    }
+    if (reflects && job->mirrored[0]) {
+        const rgb_v mirrored = load_rgb(job->mirrored, at);
+        indirect = sum(indirect, layered ? scaled(mirrored, transmittance) : mirrored);
     }
     store_rgb(job->indirect, at, indirect);
     return sum(c, indirect);

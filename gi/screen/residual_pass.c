@@ -37,6 +37,7 @@ static es_result compose_sent(es_renderer* r, es_planes* sent)
     es_result result = es_planes_resize(r->context, sent, &r->gbuffer);
     if (result) return result;
     es_compose_job job = es_renderer_compose_job(r);
+    job.mirrors = NULL; /* what they see is found later, and sent to nobody */
     memset(job.finished, 0, sizeof job.finished);
     memset(job.further, 0, sizeof job.further);
     if (!sends_indirect(&r->settings)) {

@@ -1,0 +1,63 @@
+/* What a renderer keeps of its reflections (gi/reflections/reflection_passes.h). */
+#ifndef EARTHSHINE_GI_REFLECTIONS_REFLECTIONS_H
+#define EARTHSHINE_GI_REFLECTIONS_REFLECTIONS_H
+
+#include "gi/history.h"
+#include "gi/layer_light.h"
+#include "gi/reflections/reflecting.h"
+
+/* Texels of a map that show another thing with a map: what that reflects is added to what else they show. Arrays of `count`, in multiples of eight. */
+typedef struct es_second_reflections {
+    int32_t *texel, *map;       /* from the map's first; of the other thing, -1 in what fills up the last eight */
+    float *position[3], *direction[3], *alpha, *albedo[3];
+    float* base[3];             /* what the texel shows without */
+    float* seen[3];             /* radiance from the other map */
+    uint32_t count, capacity;
+    void* memory;
+    size_t bytes;
+} es_second_reflections;
+
+typedef struct es_reflection_map {
+    uint32_t instance;          /* id + 1; 0: free */
+    bool wanted;                /* in this frame */
+    uint32_t place;             /* of the instance in the frame's list of what light meets */
+    es_vec3 centre;
+    float near_plane;
+    uint32_t last_level;
+    uint64_t drawn;             /* hash of all that it was drawn from; 0: it was not */
+    es_second_reflections second;
+} es_reflection_map;
+
+/* Memory of es_reflecting_planes. */
+typedef struct es_reflecting_buffers {
+    es_reflecting_planes planes;
+    es_planes direction, albedo;
+    size_t pixels, chunks;
+} es_reflecting_buffers;
+
+typedef struct es_reflections {
+    /* things that have maps, in no particular order */
+    es_reflection_map* maps;
+    size_t map_capacity;
+    uint32_t map_count;         /* of which some may be free */
+    uint32_t* map_of;           /* by instance id + 1 */
+    size_t map_of_capacity, map_of_count;
+    es_reflection_layout layout;
+    float* texels;              /* of all maps */
+    size_t texel_maps;          /* there is room for */
+    float *centre[3], *last_level;
+    size_t centre_capacity[3], level_capacity;
+
+    /* what a face is drawn and lit in */
+    es_gbuffer face;
+    es_draw_list others;        /* all but the thing itself */
+    es_raster_instance* instances;
+    size_t instance_capacity;
+    es_layer_light lamps, indirect;
+    es_planes background, direct, radiance;
+
+    es_reflecting_buffers on_face, on_picture;
+    es_planes light;            /* reflected radiance */
+} es_reflections;
+
+#endif
