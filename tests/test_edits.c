@@ -5,6 +5,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,12 +18,9 @@
 typedef struct scene { es_context* context; es_world* world; es_mesh mesh; es_node node; es_instance mirror, other; es_camera camera; es_node camera_node; } scene;
 
 /* A mirror, the square of ±1 m in the xy plane, facing +z, of 8 × 8 cells; behind the eye at z = 5 another. */
-static scene open_scene(void)
+static void fill_scene(scene* out)
 {
-    scene s = {0};
-    es_context_desc context = es_default_context_desc();
-    context.threads = 2;
-    assert_int_equal(es_context_create(&context, &s.context), ES_OK);
+    scene s = *out;
     assert_int_equal(es_world_create(s.context, NULL, &s.world), ES_OK);
     enum { N = 8 };
     float positions[(N + 1) * (N + 1)][3];
@@ -50,6 +48,16 @@ static scene open_scene(void)
     es_camera_desc camera = es_default_camera_desc();
     camera.node = s.camera_node;
     assert_int_equal(es_world_add_camera(s.world, &camera, &s.camera), ES_OK);
+    *out = s;
+}
+
+static scene open_scene(void)
+{
+    scene s = {0};
+    es_context_desc context = es_default_context_desc();
+    context.threads = 2;
+    assert_int_equal(es_context_create(&context, &s.context), ES_OK);
+    fill_scene(&s);
     return s;
 }
 
@@ -520,6 +528,85 @@ static void test_a_thousand_constraints(void** state)
     close_scene(&s);
 }
 
+/* ---- without memory ---------------------------------------------------------------------------------------------------------- */
+
+static long until_none = -1; /* allocations that still succeed; negative: all */
+
+static void* scarce_allocate(void* user, size_t size, size_t alignment)
+{
+    void* memory = NULL;
+    if (until_none == 0) return NULL;
+    until_none -= until_none > 0;
+    return posix_memalign(&memory, alignment < sizeof(void*) ? sizeof(void*) : alignment, size ? size : 1) == 0 ? memory : NULL;
+}
+
+static void scarce_release(void* user, void* pointer, size_t size) { free(pointer); }
+static void say_nothing(void* user, es_log_level level, es_result item, const char* message) {}
+
+/* Each operation with every one of its allocations failing in turn: it says so and has changed nothing, or it has done what it should. */
+static void test_without_memory_nothing_is_half_done(void** state)
+{
+    scene s = {0};
+    es_context_desc context = es_default_context_desc();
+    context.threads = 1;
+    context.allocator = (es_allocator){scarce_allocate, scarce_release, NULL};
+    context.logger.log = say_nothing;
+    const char* path = "edits-scarcity.gltf";
+    for (int operation = 0; operation < 8; operation++)
+        for (long allocations = 0, done = 0; !done; allocations++) {
+            until_none = -1;
+            assert_int_equal(es_context_create(&context, &s.context), ES_OK);
+            fill_scene(&s);
+            es_constraint_desc d = constraint_desc(&s);
+            d.geodesic = true;
+            es_constraint c = add_constraint(&s, &d), another;
+            es_region r = add_region(&s, ES_REGION_GEODESIC, 0.5f), other;
+            es_edit_history* history;
+            assert_int_equal(es_edit_history_create(s.world, 0, &history), ES_OK);
+            assert_int_equal(es_world_save_edits(s.world, NULL, path), ES_OK);
+            size_t size;
+            void* saved = save(&s, &size);
+            es_region_stroke stroke = {d.reflecting, d.reflecting, 1, false};
+            es_region_desc free_form = {.name = "drawn", .type = ES_REGION_FREE_FORM, .strokes = &stroke, .stroke_count = 1};
+            es_constraint_key keys[2] = {{0, d.reflecting, d.reflected, {0}}, {1, anchor_at(&s, s.mirror, -0.5, 0, 0), d.reflected, {0}}};
+            d.keys = keys;
+            d.key_count = 2;
+            if (operation >= 3) assert_int_equal(es_world_destroy_region(s.world, r), ES_OK);
+            const uint64_t before = es_world_hash(s.world);
+            until_none = allocations;
+            es_result result = ES_OK;
+            switch (operation) {
+            case 0: result = es_world_add_constraint(s.world, &d, &another); break;
+            case 1: result = es_world_set_constraint(s.world, c, &d); break;
+            case 2: result = es_world_add_region(s.world, &free_form, &other); break;
+            case 3: result = es_edit_history_undo(history); break;
+            case 4: result = es_world_load_edits(s.world, path); break;
+            case 5: result = es_world_restore(s.world, saved, size); break;
+            case 6: result = es_world_set_parameter(s.world, "turn", 1); break;
+            default: /* distances and trees: what finds no memory has no effect, and says so */
+                es_world_edits(s.world);
+                result = state_of(&s, c).effect == ES_EDIT_NO_MEMORY ? ES_OUT_OF_MEMORY : ES_OK;
+            }
+            until_none = -1;
+            assert_true(result == ES_OK || result == ES_OUT_OF_MEMORY);
+            if (result != ES_OK) assert_true(es_world_hash(s.world) == before);
+            if (operation == 7) assert_int_equal(state_of(&s, c).effect, ES_EDIT_ACTIVE); /* with memory again */
+            done = result == ES_OK;
+            if (operation >= 3 && operation <= 5 && done) {
+                es_region_state there;
+                size_t regions = 0;
+                assert_int_equal(es_world_enumerate(s.world, ES_OBJECT_REGION, NULL, &regions), ES_OK);
+                assert_int_equal(regions, 1);
+                if (operation != 4) assert_int_equal(es_world_get_region_state(s.world, r, &there), ES_OK);
+            }
+            assert_true(allocations < 100);
+            free(saved);
+            es_edit_history_destroy(history);
+            close_scene(&s);
+        }
+    remove(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -535,6 +622,7 @@ int main(void)
         cmocka_unit_test(test_undo_takes_back_and_redo_does_again),
         cmocka_unit_test(test_history_keeps_within_its_memory),
         cmocka_unit_test(test_a_thousand_constraints),
+        cmocka_unit_test(test_without_memory_nothing_is_half_done),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

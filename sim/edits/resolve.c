@@ -224,21 +224,24 @@ void es_edits_refresh(es_world* world)
     es_resolved_edits *made = &edits->made, *making = &edits->making;
     const es_edit_list before = edits->list;
     const size_t strokes_before = made->stroke_count;
-    bool changed = false;
+    bool changed = false, short_of_memory = false;
     uint32_t regions = 0, constraints = 0;
     making->stroke_count = 0;
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_REGION].slot_count; slot++) {
         es_region_object* region = es_slots_at(&world->slots[ES_OBJECT_REGION], slot);
         if (!region) continue;
         region->state.effect = resolve_region(world, region, &making->regions[regions], making, &changed);
+        short_of_memory |= region->state.effect == ES_EDIT_NO_MEMORY;
         if (region->state.effect == ES_EDIT_ACTIVE) regions++;
     }
     for (uint32_t slot = 0; slot < world->slots[ES_OBJECT_CONSTRAINT].slot_count; slot++) {
         es_constraint_object* constraint = es_slots_at(&world->slots[ES_OBJECT_CONSTRAINT], slot);
         if (!constraint) continue;
         constraint->state.effect = resolve_constraint(world, constraint, eye, &making->constraints[constraints], &changed);
+        short_of_memory |= constraint->state.effect == ES_EDIT_NO_MEMORY;
         if (constraint->state.effect == ES_EDIT_ACTIVE) constraints++;
     }
+    if (short_of_memory) edits->inputs.edits = 0; /* there may be some the next time */
     edits->list = (es_edit_list){making->regions, making->constraints, regions, constraints, edits->frozen, edits->frozen ? relative(world, edits->eye) : es_v3(0, 0, 0)};
     unlink_arrays(made, before.region_count, before.constraint_count);
     changed |= before.region_count != regions || before.constraint_count != constraints || before.frozen != edits->list.frozen || memcmp(&before.eye, &edits->list.eye, sizeof before.eye) != 0 ||
