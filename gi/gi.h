@@ -77,7 +77,8 @@ typedef enum es_micro_light {
 /* What mirrors and glossy things show of what is around them. */
 typedef enum es_reflections_method {
     ES_REFLECTIONS_NONE,  /* lights alone: as highlights of spot, point and directional ones, and of lamps and indirect light through lobes widened to lamp_roughness and lobe_roughness */
-    ES_REFLECTIONS_MAPS   /* a picture: each reflecting thing has a prefiltered cube map of its surroundings (Ritschel thesis §7.5.3), looked up from where rays meet what it shows */
+    ES_REFLECTIONS_MAPS,  /* a picture: each reflecting thing has a prefiltered cube map of its surroundings (Ritschel thesis §7.5.3), looked up from where rays meet what it shows */
+    ES_REFLECTIONS_TRACED /* a picture, found by rays: right where maps do not see, and noisy in lobes */
 } es_reflections_method;
 
 /* How light spreads in the eye that looks at the picture. */
@@ -154,6 +155,7 @@ typedef struct es_renderer_settings {
     float reflection_roughness;      /* surfaces whose lobe is at most so wide reflect, 0 … 1 */
     uint32_t reflection_maps;        /* MAPS: things that have one, at most; those that look largest from the camera, by their bounds. Others reflect as with NONE */
     uint32_t reflection_size;        /* MAPS: texels of a face's side, a power of two */
+    uint32_t reflection_rays;        /* TRACED: for each pixel whose lobe is no mirror's */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */

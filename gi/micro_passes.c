@@ -309,7 +309,7 @@ es_result es_micro_light_layer(es_renderer* r, const es_lit_surfaces* of, es_lay
         if (lobe && !of->lobes) continue;
         const es_micro_pixels pixels = {.gbuffer = of->gbuffer, .rays = of->rays, .kind = lobe ? ES_GATHER_LOBE : ES_GATHER_DIFFUSE, .spacing = 1, .seed = es_hash_u32(0) + s->seed};
         es_planes *sparse = lobe ? &light->sparse_specular : &light->sparse_irradiance, *planes = lobe ? &light->specular : &light->irradiance;
-        const uint32_t spacing = lobe ? lobe_spacing(s) : s->micro_spacing;
+        const uint32_t spacing = of->rays.found[0] ? 1 : lobe ? lobe_spacing(s) : s->micro_spacing; /* what other rays found is no surface to interpolate along */
         if (spacing == 1) result = gather_fully(r, &pixels, planes, &gathered);
         else result = gather_sparsely(r, &pixels, spacing, sparse, &gathered);
         if (!result && spacing > 1) result = interpolate(r, &pixels, spacing, sparse, planes, &gathered);

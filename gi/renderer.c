@@ -662,7 +662,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_screen_bounce(r, in);
     if (!result) result = es_pass_residual(r, in);
     if (!result) result = es_pass_reflection_maps(r, in);
-    if (!result) result = es_pass_reflections(r);
+    if (!result) result = es_pass_reflections(r, in);
     if (!result) result = es_pass_blend_layers(r, in);
     if (!result) result = es_pass_blend_light(r, in);
     return result ? result : es_pass_antialias(r, picture);

@@ -109,10 +109,11 @@ static const es_setting renderer_table[] = {
 
     {"blend.layers", ES_SETTING_INT, "4", 0, ES_BLEND_MAX_LAYERS, NULL, "blended surfaces in front of the picture that are peeled from it, lit and composited; of more the nearest; 0: they are drawn as masked", AT(blend_layers)},
 
-    {"reflections", ES_SETTING_CHOICE, "none", 0, 0, "none|maps", "what mirrors and glossy things show of what is around them: nothing but highlights of lights, or a picture, looked up in a cube map of each thing's surroundings", AT(reflections)},
+    {"reflections", ES_SETTING_CHOICE, "none", 0, 0, "none|maps|traced", "what mirrors and glossy things show of what is around them: nothing but highlights of lights, or a picture, looked up in a cube map of each thing's surroundings or found by rays", AT(reflections)},
     {"reflections.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "surfaces of at most this roughness reflect a picture", AT(reflection_roughness)},
     {"reflections.maps", ES_SETTING_INT, "8", 1, ES_REFLECTION_MOST_MAPS, NULL, "reflections maps: things that have a map, at most; those that look largest", AT(reflection_maps)},
     {"reflections.size", ES_SETTING_INT, "256", 16, 1024, NULL, "reflections maps: texels of a side of each of a map's six faces, a power of two", AT(reflection_size)},
+    {"reflections.rays", ES_SETTING_INT, "4", 1, 256, NULL, "reflections traced: rays for each pixel whose lobe is no mirror's", AT(reflection_rays)},
 
     {"temporal", ES_SETTING_BOOL, "false", 0, 1, NULL, "temporal coherence: indirect light is blended with last frame's by confidence", AT(temporal)},
     {"temporal.stage", ES_SETTING_CHOICE, "after-filter", 0, 0, "after-filter|before-filter", "where last frame's light comes in", AT(temporal_stage)},

@@ -3,6 +3,7 @@
 #include "gi/bounce_pass.h"
 #include "gi/lamp_passes.h"
 #include "gi/micro_passes.h"
+#include "gi/reflections/reflection_passes.h"
 #include "gi/renderer.h"
 #include "gi/vpl_visibility.h"
 
@@ -13,7 +14,7 @@ es_result es_pass_hierarchy(es_renderer* r, const es_frame_inputs* in, es_world*
     const es_renderer_settings* s = &r->settings;
     const bool photons = es_micro_wants_photons(s), lights = s->method != ES_GI_MICRO && (s->method == ES_GI_VPL_TRACED || s->method == ES_GI_VPL_SAMPLED || s->traced_bias == ES_TRACED_COMPENSATED ||
         (s->near_distance > 0.0f && s->traced_bias == ES_TRACED_BOUNDED));
-    const char* why = es_lamps_want_rays(r) || es_lamps_bounce_wants_rays(r, in) ? NULL : photons ? in->no_indirect : !lights && !es_bounce_wants_rays(s) ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
+    const char* why = es_reflections_want_rays(r) || es_lamps_want_rays(r) || es_lamps_bounce_wants_rays(r, in) ? NULL : photons ? in->no_indirect : !lights && !es_bounce_wants_rays(s) ? "nothing is found by rays" : in->no_vpls ? in->no_vpls : r->first_vpls ? NULL : "the lights reach nothing";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_HIERARCHY, why);
         es_trace_scene_free(&r->trace_scene);

@@ -1,4 +1,4 @@
-/* Reflections by maps: mirrored points where the law of reflection has them, an environment as a chrome ball shows it, evenly bright surroundings, levels of lobes, what is
+/* Reflections by maps and by rays: mirrored points where the law of reflection has them, an environment as a chrome ball shows it, evenly bright surroundings, levels of lobes, what is
  * drawn again and when, and that skipping changes nothing. */
 #include <math.h>
 #include <setjmp.h>
@@ -145,7 +145,8 @@ static void test_plane(void** state)
 {
     (void)state;
     enum { WIDTH = 160, HEIGHT = 120 };
-    for (uint32_t trial = 0; trial < 12; trial++) {
+    for (uint32_t trial = 0; trial < 16; trial++) {
+        const bool traced = trial >= 12;
         small_world w = small_world_create();
         const es_material_desc mirror = metal(1, 0);
         add_rectangle(&w, es_v3(-2, -2, 0), es_v3(4, 0, 0), es_v3(0, 4, 0), &mirror);
@@ -160,6 +161,7 @@ static void test_plane(void** state)
         s.method = ES_GI_NONE;
         s.lamps = ES_LAMPS_NONE;
         s.reflection_size = 512;
+        if (traced) s.reflections = ES_REFLECTIONS_TRACED;
         es_image reflections = picture_of(&w, &s, "reflections");
         double sum = 0;
         uint32_t pixels = 0, beyond = 0;
@@ -176,7 +178,7 @@ static void test_plane(void** state)
                 beyond += off > 1;
             }
         /* along the room's edges two walls are mixed in a texel */
-        if (pixels < 3000 || sum / pixels > 0.2 || beyond > pixels / 50) fail_msg("trial %u: %u pixels are off by %.3f, %u of them by more than one", trial, pixels, pixels ? sum / pixels : 0, beyond);
+        if (pixels < 3000 || sum / pixels > (traced ? 0.005 : 0.2) || beyond > (traced ? 0 : pixels / 50)) fail_msg("trial %u: %u pixels are off by %.3f, %u of them by more than one", trial, pixels, pixels ? sum / pixels : 0, beyond);
         es_image_destroy(w.context, &reflections);
         small_world_destroy(&w);
     }
@@ -188,14 +190,15 @@ static void test_square_in_mirror(void** state)
     (void)state;
     enum { WIDTH = 320, HEIGHT = 240, TRIALS = 24 };
     double off = 0;
-    for (uint32_t trial = 0; trial < TRIALS; trial++) {
+    for (uint32_t trial = 0; trial < 2 * TRIALS; trial++) {
+        const bool traced = trial >= TRIALS;
         small_world w = small_world_create();
         const es_material_desc mirror = metal(1, 0), glowing = lambert(0, 4), wall = lambert(0.5f, 0);
         add_rectangle(&w, es_v3(-1.5f, -1, 0), es_v3(3, 0, 0), es_v3(0, 2, 0), &mirror);
-        const es_vec3 at = es_v3(some(100 + 6 * trial, -1, 1), some(101 + 6 * trial, -0.7f, 0.7f), some(102 + 6 * trial, 0.6f, 3.4f));
+        const es_vec3 at = es_v3(some(100 + 6 * (trial % TRIALS), -1, 1), some(101 + 6 * (trial % TRIALS), -0.7f, 0.7f), some(102 + 6 * (trial % TRIALS), 0.6f, 3.4f));
         add_rectangle(&w, es_v3(at.x + 0.15f, at.y - 0.15f, at.z), es_v3(-0.3f, 0, 0), es_v3(0, 0.3f, 0), &glowing);
         add_rectangle(&w, es_v3(-3, -2, 4), es_v3(0, 4, 0), es_v3(6, 0, 0), &wall);
-        const es_vec3 eye = es_v3(some(103 + 6 * trial, -1, 1), some(104 + 6 * trial, -0.6f, 0.6f), some(105 + 6 * trial, 1.5f, 3));
+        const es_vec3 eye = es_v3(some(103 + 6 * (trial % TRIALS), -1, 1), some(104 + 6 * (trial % TRIALS), -0.6f, 0.6f), some(105 + 6 * (trial % TRIALS), 1.5f, 3));
         /* what is mirrored is seen where the line from its image to the eye goes through the mirror */
         const float share = eye.z / (eye.z + at.z);
         look(&w, camera_of(1.0f), eye, es_v3(eye.x + (at.x - eye.x) * share, eye.y + (at.y - eye.y) * share, 0));
@@ -203,6 +206,7 @@ static void test_square_in_mirror(void** state)
         s.method = ES_GI_NONE;
         s.lamps = ES_LAMPS_NONE;
         s.reflection_size = 512;
+        if (traced) s.reflections = ES_REFLECTIONS_TRACED;
         es_image reflections = picture_of(&w, &s, "reflections");
         double expected[2], found[2];
         pixel_of(&w, WIDTH, HEIGHT, es_v3(at.x, at.y, -at.z), expected);
@@ -210,7 +214,8 @@ static void test_square_in_mirror(void** state)
         /* a rim is lost where rays enter and leave what the square hides within a step, or won where what it hides is met */
         if (fabs(found[0] - expected[0]) > 2 + 0.1 * side || fabs(found[1] - expected[1]) > 2 + 0.1 * side || fabs(red / (4 * side * side) - 1) > 0.25)
             fail_msg("trial %u: at (%.2f, %.2f), not at (%.2f, %.2f); %.1f of %.1f pixels", trial, found[0], found[1], expected[0], expected[1], red / 4, side * side);
-        off += hypot(found[0] - expected[0], found[1] - expected[1]) / TRIALS;
+        if (traced && (hypot(found[0] - expected[0], found[1] - expected[1]) > 1 || fabs(red / (4 * side * side) - 1) > 0.25)) fail_msg("traced, trial %u: at (%.3f, %.3f), not at (%.3f, %.3f); %.1f of %.1f pixels", trial, found[0], found[1], expected[0], expected[1], red / 4, side * side);
+        if (!traced) off += hypot(found[0] - expected[0], found[1] - expected[1]) / TRIALS;
         es_image_destroy(w.context, &reflections);
         small_world_destroy(&w);
     }
@@ -280,7 +285,7 @@ static void test_furnace(void** state)
 {
     (void)state;
     enum { SIZE = 64 };
-    static const float roughness[] = {0, 0.1f, 0.3f, 0.6f, 1};
+    static const float roughness[] = {0, 0, 0.1f, 0.1f, 0.3f, 0.3f, 0.6f, 0.6f, 1, 1}; /* by maps, by rays */
     for (size_t i = 0; i < sizeof roughness / sizeof roughness[0]; i++) {
         small_world w = small_world_create();
         const es_environment_desc sky = {.radiance = {1, 1, 1}};
@@ -290,6 +295,7 @@ static void test_furnace(void** state)
         look(&w, camera_of(0.8f), es_v3(0, 0, 3), es_v3(0, 0, 0));
         es_renderer_settings s = settings_of(SIZE, SIZE);
         s.reflection_roughness = 1;
+        if (i & 1) s.reflections = ES_REFLECTIONS_TRACED;
         es_renderer* renderer = renderer_of(w.context, &s);
         render(renderer, w.world);
         es_image reflections = picture(renderer, "reflections"), radiance = picture(renderer, "radiance"), normal = picture(renderer, "normal");
@@ -303,7 +309,9 @@ static void test_furnace(void** state)
                 const es_vec3 on_plane = pixel_on_plane(&w, SIZE, SIZE, x, y, es_v3(0, 0, 1), es_v3(0, 0, 1)), d = es_v3_normalize(es_v3_sub(on_plane, es_v3(0, 0, 3)), es_v3(0, 0, -1));
                 const float cosine = es_maxf(-es_v3_dot(n, d), 1e-3f);
                 const es_surface surface = es_surface_of(ES_SURFACE_METALLIC_ROUGHNESS, es_v3(0.7f, 0.7f, 0.7f), 1, es_floor(roughness[i] * 255 + 0.5f) / 255, 1);
-                assert_float_equal(reflections.pixels[at], es_lobe_albedo_at(table, &surface, cosine).x, 0.003f);
+                /* rays along the facets meet their neighbours */
+                const bool traced = s.reflections == ES_REFLECTIONS_TRACED;
+                if (!traced || cosine > 0.6f) assert_float_equal(reflections.pixels[at], es_lobe_albedo_at(table, &surface, cosine).x, traced ? 0.03f : 0.003f);
                 /* a metal: nothing but the lobe */
                 assert_true(radiance.pixels[at] == reflections.pixels[at]);
             }
@@ -653,7 +661,7 @@ static void change_something(room* r, es_renderer_settings* s, uint32_t what)
     case 6: s->reflection_roughness = a > 0 ? 0.3f : 0.1f; break;
     case 7: s->reflection_maps = a > 0 ? 1 : 8; break;
     case 8: s->reflection_size = a > 0 ? 32 : 64; break;
-    case 9: s->reflections = a > -0.3f ? ES_REFLECTIONS_MAPS : ES_REFLECTIONS_NONE; break;
+    case 9: s->reflections = a > 0 ? ES_REFLECTIONS_MAPS : a > -0.35f ? ES_REFLECTIONS_TRACED : ES_REFLECTIONS_NONE; break;
     case 10: {
         es_material_desc m = metal(0.7f + 0.4f * a, a > 0 ? 0 : 0.15f);
         assert_int_equal(es_world_set_material(world, r->chrome, &m), ES_OK);
@@ -668,8 +676,8 @@ static void change_something(room* r, es_renderer_settings* s, uint32_t what)
 static void test_skipping_changes_nothing(void** state)
 {
     (void)state;
-    static const uint32_t methods[] = {ES_GI_ISM, ES_GI_NONE, ES_GI_SECOND_ORDER};
-    for (uint32_t trial = 0; trial < 3; trial++) {
+    static const uint32_t methods[] = {ES_GI_ISM, ES_GI_NONE, ES_GI_SECOND_ORDER, ES_GI_ISM, ES_GI_MICRO};
+    for (uint32_t trial = 0; trial < 5; trial++) {
         room r = make_room();
         es_renderer_settings s = settings_of(61, 45);
         s.method = methods[trial];
@@ -677,6 +685,9 @@ static void test_skipping_changes_nothing(void** state)
         s.temporal = trial == 0;
         s.second_lights = 20;
         s.second_negative = 10;
+        s.micro_points = 1024;
+        s.micro_size = 8;
+        if (trial > 2) s.reflections = ES_REFLECTIONS_TRACED;
         es_renderer *skips = renderer_of(r.w.context, &s), *draws = renderer_of(r.w.context, &s);
         for (uint32_t frame = 0; frame < 24; frame++) {
             if (frame) change_something(&r, &s, 100 * trial + frame);
@@ -708,9 +719,11 @@ static void test_same_bits(void** state)
         room r = make_room_in(context);
         es_renderer_settings s = settings_of(61, 45);
         s.reflection_size = 32;
-        es_image image = picture_of(&r.w, &s, "radiance");
-        expect_same_bits(&same, image.pixels, (size_t)image.width * image.height * 3 * sizeof(float));
-        es_image_destroy(context, &image);
+        for (s.reflections = ES_REFLECTIONS_MAPS; s.reflections <= ES_REFLECTIONS_TRACED; s.reflections++) {
+            es_image image = picture_of(&r.w, &s, "radiance");
+            expect_same_bits(&same, image.pixels, (size_t)image.width * image.height * 3 * sizeof(float));
+            es_image_destroy(context, &image);
+        }
         es_world_destroy(r.w.world);
         es_context_destroy(context);
     }
@@ -741,6 +754,13 @@ static void test_second_reflections(void** state)
     pixel_of(&w, 160, 120, es_v3(0, 0, -4), expected);
     const uint32_t x = (uint32_t)(expected[0] + 0.5), y = (uint32_t)(expected[1] + 0.5);
     const float* seen = reflections.pixels + 3 * ((size_t)y * 160 + x);
+    assert_true(seen[0] > 4 && seen[1] < 0.5f);
+    es_image_destroy(w.context, &reflections);
+    /* rays show where it is */
+    s.reflections = ES_REFLECTIONS_TRACED;
+    reflections = picture_of(&w, &s, "reflections");
+    pixel_of(&w, 160, 120, es_v3(0, 0, -7), expected);
+    seen = reflections.pixels + 3 * ((size_t)(expected[1] + 0.5) * 160 + (size_t)(expected[0] + 0.5));
     assert_true(seen[0] > 4 && seen[1] < 0.5f);
     es_image_destroy(w.context, &reflections);
     small_world_destroy(&w);
@@ -774,9 +794,11 @@ static void test_ends(void** state)
             add_sphere(&w, es_v3(0, 0, 0), 1e-4f, 12, false, &chrome);
         }
         look(&w, camera_of(1.0f), trial == 1 ? es_v3(0, 0, 3) : es_v3(0, 0, 0), es_v3(0, 0, -1));
-        for (uint32_t size = 1; size <= 40; size += 39) {
+        for (uint32_t turn = 0; turn < 4; turn++) {
+            const uint32_t size = turn & 1 ? 40 : 1;
             es_renderer_settings s = settings_of(size, size);
             s.reflection_size = 16;
+            if (turn & 2) s.reflections = ES_REFLECTIONS_TRACED;
             es_renderer* renderer = renderer_of(w.context, &s);
             expect_finite(&w, renderer);
             expect_finite(&w, renderer);

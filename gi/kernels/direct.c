@@ -30,6 +30,14 @@ typedef struct direct_row { const es_direct_job* job; uint32_t y; float base[3],
 VINL void place(const direct_row* row, uint32_t x, vf depth, vf p[3], vf d[3])
 {
     const es_pixel_rays* rays = &row->job->rays;
+    if (rays->found[0]) {
+        const size_t at = (size_t)row->y * rays->stride + x;
+        for (int k = 0; k < 3; k++) {
+            p[k] = vf_load(rays->found[k] + at);
+            d[k] = vf_load(rays->along[k] + at);
+        }
+        return;
+    }
     const vf fx = vf_set1((float)x) + vf_iota();
     for (int k = 0; k < 3; k++) {
         d[k] = vf_set1(row->dir[k]) + fx * vf_set1(rays->dir_dx[k]);

@@ -15,6 +15,21 @@ VINL void ray_v(const es_pixel_rays* r, uint32_t x, uint32_t y, vf base[3], vf d
     }
 }
 
+/* Positions as well, and the directions from the eye that they are seen in, of any length. */
+VINL void place_v(const es_pixel_rays* r, uint32_t x, uint32_t y, vf depth, vf p[3], vf d[3])
+{
+    if (r->found[0]) {
+        const size_t at = (size_t)y * r->stride + x;
+        for (int k = 0; k < 3; k++) {
+            p[k] = vf_load(r->found[k] + at);
+            d[k] = vf_load(r->along[k] + at);
+        }
+        return;
+    }
+    ray_v(r, x, y, p, d);
+    for (int k = 0; k < 3; k++) p[k] = p[k] + depth * d[k];
+}
+
 /* Eight pixels; those that reflect. */
 static vm reflecting_v(const es_reflecting_job* job, uint32_t x, uint32_t y, vi map)
 {
@@ -30,7 +45,8 @@ static vm reflecting_v(const es_reflecting_job* job, uint32_t x, uint32_t y, vi 
     vi_store(out->map + at, map & lanes);
     if (!vm_any(lanes)) return lanes;
     vf base[3], d[3], n[3], v[3], albedo[3];
-    ray_v(&job->rays, x, y, base, d);
+    place_v(&job->rays, x, y, vf_zero(), base, d);
+    for (int k = 0; k < 3; k++) d[k] = vf_select(lanes, d[k], vf_set1(k == 2 ? 1.0f : 0.0f));
     const vf inverse = vf_set1(-1.0f) / vf_sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     for (int k = 0; k < 3; k++) v[k] = d[k] * inverse;
     es_unpack_normal_v(vi_load(g->normal + at), &n[0], &n[1], &n[2]);
@@ -73,9 +89,9 @@ static void reflected_v(const es_reflected_job* job, uint32_t x, uint32_t y, vi 
     const vm lanes = ~vi_eq(map, vi_zero());
     const vf depth = vf_and(lanes, vf_load(g->depth + at));
     vf p[3], along[3], d[3], met[3], rgb[3];
-    ray_v(&job->rays, x, y, p, along);
+    place_v(&job->rays, x, y, depth, p, along);
     for (int k = 0; k < 3; k++) {
-        p[k] = p[k] + depth * along[k];
+        p[k] = vf_and(lanes, p[k]);
         d[k] = vf_and(lanes, vf_load(job->planes.direction[k] + at));
     }
     if (job->edited[0]) {

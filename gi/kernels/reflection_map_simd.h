@@ -159,6 +159,7 @@ VINL void es_reflection_look_v(const es_reflection_atlas* atlas, vi first, const
             s->found = s->found | meets;
             s->pass_t = vf_select(first_pass, here.low_t, s->pass_t);
             s->passes = s->passes | first_pass;
+            if (vm_all(s->found | ~wanted)) break;
         }
         s->last_t = here_t;
         s->last_g = g;
@@ -185,7 +186,8 @@ VINL void es_reflection_meet_v(const es_reflection_atlas* atlas, vi first, const
             es_reflection_look_v(atlas, first, x, d, may_meet, next, &s);
             if (vm_all(s.found)) break;
         }
-        current = vm_any(may_meet);
+        /* a look that ended early left off before `next`; those that had something to look for are found */
+        current = vm_any(may_meet & ~s.found);
         t = next;
         bound = next_bound;
         distance = next_distance;

@@ -18,6 +18,12 @@ VINL surface_place place_of(const es_gbuffer* g, const es_pixel_rays* r, vi colu
     p.x = (vf_set1(r->base[0]) + x * vf_set1(r->base_dx[0]) + y * vf_set1(r->base_dy[0])) + p.depth * (vf_set1(r->dir[0]) + x * vf_set1(r->dir_dx[0]) + y * vf_set1(r->dir_dy[0]));
     p.y = (vf_set1(r->base[1]) + x * vf_set1(r->base_dx[1]) + y * vf_set1(r->base_dy[1])) + p.depth * (vf_set1(r->dir[1]) + x * vf_set1(r->dir_dx[1]) + y * vf_set1(r->dir_dy[1]));
     p.z = (vf_set1(r->base[2]) + x * vf_set1(r->base_dx[2]) + y * vf_set1(r->base_dy[2])) + p.depth * (vf_set1(r->dir[2]) + x * vf_set1(r->dir_dx[2]) + y * vf_set1(r->dir_dy[2]));
+    if (r->found[0]) {
+        const vi place = vi_set1((int32_t)(row * r->stride)) + (inside & column);
+        p.x = vf_and(p.seen, vf_gather(r->found[0], place));
+        p.y = vf_and(p.seen, vf_gather(r->found[1], place));
+        p.z = vf_and(p.seen, vf_gather(r->found[2], place));
+    }
     return p;
 }
 

@@ -99,6 +99,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 vf d = dir[k] + fx * vf_set1(rays->dir_dx[k]);
                 q[k] = (base[k] + fx * vf_set1(rays->base_dx[k])) + depth * d;
             }
+            for (int k = 0; k < 3 && rays->found[0]; k++) q[k] = vf_and(seen, vf_gather(rays->found[k] + (size_t)y * rays->stride, x));
             vf_store(batch->px + at, q[0]);
             vf_store(batch->py + at, q[1]);
             vf_store(batch->pz + at, q[2]);
@@ -128,7 +129,7 @@ static void gather(const es_shade_job* job, const lanes_of_phase* p, es_shade_ba
                 continue;
             }
             vf v[3];
-            for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : vf_set1(rays->base[k]) - q[k];
+            for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : rays->found[0] ? vf_neg(vf_and(seen, vf_gather(rays->along[k] + (size_t)y * rays->stride, x))) : vf_set1(rays->base[k]) - q[k];
             vf s = vf_set1(1.0f) / vf_sqrt(vf_max(v[0] * v[0] + v[1] * v[1] + v[2] * v[2], vf_set1(1e-30f))); /* unseen pixels lie in the eye */
             for (int k = 0; k < 3; k++) v[k] = v[k] * s;
             es_lift_to_horizon_v(nx, ny, nz, &v[0], &v[1], &v[2]);

@@ -178,6 +178,9 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
     s->reflects = m->model != ES_SURFACE_UNLIT;
     if (!front && !m->double_sided) s->emission = es_v3(0, 0, 0);
     s->surface = es_surface_of(m->model, s->base, metallic, roughness, specular);
+    s->metallic = metallic;
+    s->roughness = roughness;
+    s->specular = specular;
     if (!quantised) return;
     s->normal = es_unpack_normal(es_pack_normal(s->normal));
     uint32_t rg = es_pack_unorm16(s->base.x) | es_pack_unorm16(s->base.y) << 16, b = es_pack_unorm16(s->base.z);

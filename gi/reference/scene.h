@@ -38,6 +38,7 @@ typedef struct es_trace_surface {
     es_vec3 emission;                  /* towards wo, W/(m² sr) */
     es_vec3 base;                      /* colour */
     es_surface surface;
+    float metallic, roughness, specular; /* what that was made of; Phong: roughness is the exponent */
     uint32_t primitive;
     bool reflects;                     /* not unlit; backs of single-sided surfaces reflect as their fronts, which is how a lamp sees them */
 } es_trace_surface;

@@ -3,12 +3,8 @@
 #include <string.h>
 
 #include "gi/background.h"
-#include "gi/direct.h"
-#include "gi/indirect.h"
-#include "gi/lamp_passes.h"
 #include "gi/lit.h"
-#include "gi/micro_passes.h"
-#include "gi/second_order_pass.h"
+#include "gi/reflections/found_light.h"
 #include "platform/maths.h"
 #include "platform/random.h"
 #include "raster/view_content.h"
@@ -110,71 +106,20 @@ uint64_t es_reflection_content(es_renderer* r, const es_frame_inputs* in, const 
 
 /* ---- its light -------------------------------------------------------------------------------------------------------------------------- */
 
-static void add_light(const es_layer_light* light, const float* irradiance[3], const float* specular[3], const uint8_t** lit)
-{
-    const es_planes *diffuse = light->filtered ? &light->filtered_irradiance : &light->irradiance, *lobes = light->filtered_lobes ? &light->filtered_specular : &light->specular;
-    for (int k = 0; k < 3; k++) {
-        irradiance[k] = diffuse->at[k];
-        specular[k] = light->lobes ? lobes->at[k] : NULL;
-    }
-    *lit = light->lobes ? lobes->lit : NULL;
-}
-
-static es_result light_indirectly(es_renderer* r, const es_frame_inputs* in, const es_pixel_rays* rays, es_compose_job* job)
-{
-    es_reflections* f = &r->reflections;
-    const uint32_t method = r->frame.settings.method;
-    const es_lit_surfaces surfaces = {&f->face, *rays, es_frame_has_lobes(r, in->list)};
-    f->indirect.lobes = surfaces.lobes && method != ES_GI_SECOND_ORDER;
-    es_result result = method == ES_GI_MICRO ? es_micro_light_layer(r, &surfaces, &f->indirect)
-                       : method == ES_GI_SECOND_ORDER ? es_second_order_light_layer(r, &surfaces, &f->indirect) : es_indirect_shade_layer(r, &surfaces, r->vpl_count, &f->indirect);
-    if (!result) result = es_indirect_filter_layer(r, &surfaces, &f->indirect);
-    if (!result) add_light(&f->indirect, job->irradiance, job->specular, &job->lit);
-    return result;
-}
-
-static es_result light_by_lamps(es_renderer* r, const es_frame_inputs* in, const es_pixel_rays* rays, es_compose_job* job)
-{
-    es_reflections* f = &r->reflections;
-    const es_lit_surfaces surfaces = {&f->face, *rays, es_lamps_anything_specular(in->list)};
-    es_result result = es_lamps_light_layer(r, &surfaces, &f->lamps);
-    if (!result) add_light(&f->lamps, job->lamp_irradiance, job->lamp_specular, &job->lamp_lit);
-    return result;
-}
-
-static void light_directly(es_renderer* r, const es_pixel_rays* rays)
-{
-    const es_renderer_settings* s = &r->settings;
-    const es_planes* direct = &r->reflections.direct;
-    for (uint32_t i = 0; i < r->light_count; i++) {
-        const es_direct_job job = {.gbuffer = &r->reflections.face, .rays = *rays, .view = &r->light_views[i], .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
-            .shadow_slope_bias = s->shadow_slope_bias, .first = i == 0, .out = {direct->at[0], direct->at[1], direct->at[2]}};
-        es_direct_light(r->context, &job);
-    }
-}
-
 static es_result light_face(es_renderer* r, const es_frame_inputs* in, const es_pixel_rays* rays)
 {
     es_reflections* f = &r->reflections;
-    es_compose_job job = {.gbuffer = &f->face, .mirrors = f->on_face.planes.map};
+    es_found_surfaces of = {.gbuffer = &f->face, .rays = *rays, .mirrors = f->on_face.planes.map};
     es_result result = es_planes_resize(r->context, &f->radiance, &f->face);
     if (!result && in->has_environment) result = es_planes_resize(r->context, &f->background, &f->face);
-    if (!result && r->light_count) result = es_planes_resize(r->context, &f->direct, &f->face);
-    if (!result && es_indirect_is_there(r)) result = light_indirectly(r, in, rays, &job);
-    if (!result && es_lamps_are_there(r) && r->lamps.set.shaded_count) result = light_by_lamps(r, in, rays, &job);
     if (result) return result;
-    if (in->has_environment) {
-        const es_background_job behind = {.gbuffer = &f->face, .rays = *rays, .environment = &in->environment, .out = {f->background.at[0], f->background.at[1], f->background.at[2]}};
-        es_background_fill(r->context, &behind);
-    }
-    if (r->light_count) light_directly(r, rays);
+    const es_background_job behind = {.gbuffer = &f->face, .rays = *rays, .environment = &in->environment, .out = {f->background.at[0], f->background.at[1], f->background.at[2]}};
+    if (in->has_environment) es_background_fill(r->context, &behind);
     for (int k = 0; k < 3; k++) {
-        if (in->has_environment) job.background[k] = f->background.at[k];
-        if (r->light_count) job.direct[k] = f->direct.at[k];
-        job.radiance[k] = f->radiance.at[k];
+        if (in->has_environment) of.background[k] = f->background.at[k];
+        of.radiance[k] = f->radiance.at[k];
     }
-    es_compose(r->context, &job);
-    return ES_OK;
+    return es_light_found(r, in, &of, &f->face_light);
 }
 
 /* ---- drawing ------------------------------------------------------------------------------------------------------------------------------- */

@@ -5,7 +5,9 @@
 #include "gi/edit/edit_pass.h"
 #include "gi/indirect.h"
 #include "gi/lamp_passes.h"
+#include "gi/reflections/found_light.h"
 #include "gi/reflections/map_faces.h"
+#include "gi/reflections/traced.h"
 #include "platform/maths.h"
 #include "platform/random.h"
 
@@ -19,10 +21,9 @@ static void free_maps(es_context* context, es_reflections* f)
     f->texels = NULL;
     f->texel_maps = 0;
     es_gbuffer_destroy(context, &f->face);
-    es_planes* const planes[] = {&f->lamps.irradiance, &f->lamps.specular, &f->lamps.filtered_irradiance, &f->lamps.filtered_specular, &f->lamps.sparse_irradiance, &f->lamps.sparse_specular,
-        &f->indirect.irradiance, &f->indirect.specular, &f->indirect.filtered_irradiance, &f->indirect.filtered_specular, &f->indirect.sparse_irradiance, &f->indirect.sparse_specular,
-        &f->background, &f->direct, &f->radiance};
-    for (size_t i = 0; i < sizeof planes / sizeof planes[0]; i++) es_planes_free(context, planes[i]);
+    es_planes_free(context, &f->background);
+    es_planes_free(context, &f->radiance);
+    es_found_light_free(context, &f->face_light);
     es_reflecting_buffers_free(context, &f->on_face);
     f->layout = (es_reflection_layout){0};
 }
@@ -31,6 +32,7 @@ void es_reflections_free_planes(es_context* context, es_reflections* f)
 {
     es_reflecting_buffers_free(context, &f->on_picture);
     es_planes_free(context, &f->light);
+    for (int i = 0; i < 2; i++) es_traced_level_free(context, &f->levels[i]);
 }
 
 void es_reflections_free(es_context* context, es_reflections* f)
@@ -145,6 +147,8 @@ static es_result choose(es_renderer* r, const es_frame_inputs* in)
     candidate chosen[ES_REFLECTION_MOST_MAPS];
     uint32_t count = 0, ids = 0;
     const es_vec3 eye = eye_of(&r->rays);
+    const bool traced = r->settings.reflections == ES_REFLECTIONS_TRACED;
+    f->wants_rays = false;
     for (uint32_t i = 0; i < in->list->instance_count; i++) {
         candidate c;
         if (is_candidate(r, in->list, i, eye, &c)) keep_largest(chosen, &count, r->settings.reflection_maps, &c);
@@ -155,6 +159,16 @@ static es_result choose(es_renderer* r, const es_frame_inputs* in)
     if (!es_grow(r->context, (void**)&f->map_of, &f->map_of_capacity, 0, ids + 1, sizeof *f->map_of)) return es_context_last_result(r->context);
     f->map_of_count = ids + 1;
     memset(f->map_of, 0, f->map_of_count * sizeof *f->map_of);
+    if (traced) {
+        free_maps(r->context, f);
+        for (uint32_t i = 0; i < in->list->instance_count; i++) {
+            candidate c;
+            if (!is_candidate(r, in->list, i, eye, &c)) continue;
+            f->map_of[c.id] = 1;
+            f->wants_rays = true;
+        }
+        return ES_OK;
+    }
     es_result result = reserve_maps(r, count);
     if (result) return result;
     for (uint32_t i = 0; i < f->map_count; i++) f->maps[i].wanted = false;
@@ -205,7 +219,7 @@ es_result es_pass_reflecting(es_renderer* r, const es_frame_inputs* in)
     const char* why = nothing(r, in);
     es_result result = why ? ES_OK : choose(r, in);
     if (result) return result;
-    if (!why && !any_wanted(f)) why = "nothing reflects";
+    if (!why && !any_wanted(f) && !f->wants_rays) why = "nothing reflects";
     if (why) {
         es_plan_not_needed(plan, ES_PASS_REFLECTING, why);
         es_reflections_free(r->context, f);
@@ -256,6 +270,10 @@ es_result es_pass_reflection_maps(es_renderer* r, const es_frame_inputs* in)
         es_plan_not_needed(plan, ES_PASS_REFLECTION_MAPS, plan->stats[ES_PASS_REFLECTING].skipped);
         return ES_OK;
     }
+    if (f->wants_rays) {
+        es_plan_not_needed(plan, ES_PASS_REFLECTION_MAPS, "reflections is traced");
+        return ES_OK;
+    }
     const uint64_t light = light_hash(r, in);
     es_plan_begin(plan, ES_PASS_REFLECTION_MAPS);
     es_plan_reads(plan, &light, sizeof light);
@@ -285,7 +303,27 @@ es_result es_pass_reflection_maps(es_renderer* r, const es_frame_inputs* in)
     return ES_OK;
 }
 
-es_result es_pass_reflections(es_renderer* r)
+static es_result look_into_maps(es_renderer* r)
+{
+    es_reflections* f = &r->reflections;
+    const es_reflection_atlas atlas = {f->texels, f->layout, {f->centre[0], f->centre[1], f->centre[2]}, f->last_level};
+    es_reflected_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .planes = f->on_picture.planes, .atlas = &atlas, .lit = f->light.lit};
+    es_edited_reflections(r, job.edited);
+    for (int k = 0; k < 3; k++) job.out[k] = f->light.at[k];
+    es_reflected_from_maps(r->context, &job);
+    return ES_OK;
+}
+
+static es_result trace(es_renderer* r, const es_frame_inputs* in, uint64_t* rays)
+{
+    es_reflections* f = &r->reflections;
+    es_traced_source source = {.gbuffer = &r->gbuffer, .rays = r->rays, .planes = &f->on_picture.planes, .rectangle = es_reflecting_rectangle(&r->gbuffer, &f->on_picture.planes), .rays_per_pixel = r->settings.reflection_rays};
+    es_edited_reflections(r, source.edited);
+    for (int k = 0; k < 3; k++) memset(f->light.at[k], 0, (size_t)r->gbuffer.stride * r->gbuffer.height * sizeof(float));
+    return es_trace_reflections(r, in, &source, f->light.at, rays);
+}
+
+es_result es_pass_reflections(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
     es_reflections* f = &r->reflections;
@@ -297,17 +335,19 @@ es_result es_pass_reflections(es_renderer* r)
     es_plan_reads_pass(plan, ES_PASS_REFLECTING);
     es_plan_reads_pass(plan, ES_PASS_REFLECTION_MAPS);
     es_plan_reads_pass(plan, ES_PASS_EDITS);
+    if (f->wants_rays) {
+        const uint64_t words[] = {light_hash(r, in), plan->version[ES_PASS_HIERARCHY], r->settings.reflection_rays};
+        es_plan_reads(plan, words, sizeof words);
+    }
     if (!es_plan_run(plan, ES_PASS_REFLECTIONS)) return ES_OK;
+    uint64_t count = (uint64_t)r->gbuffer.width * r->gbuffer.height;
     es_result result = es_planes_resize(r->context, &f->light, &r->gbuffer);
-    if (result) return result;
-    const es_reflection_atlas atlas = {f->texels, f->layout, {f->centre[0], f->centre[1], f->centre[2]}, f->last_level};
-    es_reflected_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .planes = f->on_picture.planes, .atlas = &atlas, .lit = f->light.lit};
-    es_edited_reflections(r, job.edited);
-    for (int k = 0; k < 3; k++) job.out[k] = f->light.at[k];
-    es_reflected_from_maps(r->context, &job);
-    es_plan_done(plan, ES_PASS_REFLECTIONS, (uint64_t)r->gbuffer.width * r->gbuffer.height);
-    return ES_OK;
+    if (!result) result = f->wants_rays ? trace(r, in, &count) : look_into_maps(r);
+    if (!result) es_plan_done(plan, ES_PASS_REFLECTIONS, count);
+    return result;
 }
+
+bool es_reflections_want_rays(const es_renderer* r) { return r->plan.valid[ES_PASS_REFLECTING] && r->reflections.wants_rays; }
 
 void es_reflections_read(es_plan* plan) { es_plan_reads_pass(plan, ES_PASS_REFLECTIONS); }
 

@@ -18,7 +18,9 @@ es_result es_pass_reflecting(es_renderer* renderer, const es_frame_inputs* in);
 /* After the light of the picture. */
 es_result es_pass_reflection_maps(es_renderer* renderer, const es_frame_inputs* in);
 /* What is seen along original directions, or along edited ones. */
-es_result es_pass_reflections(es_renderer* renderer);
+es_result es_pass_reflections(es_renderer* renderer, const es_frame_inputs* in);
+/* Once directions are found: are they followed by rays? */
+bool es_reflections_want_rays(const es_renderer* renderer);
 /* The job's part of it. */
 void es_reflections_compose(const es_renderer* renderer, es_compose_job* job);
 void es_reflections_read(es_plan* plan);

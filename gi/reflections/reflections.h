@@ -35,6 +35,25 @@ typedef struct es_reflecting_buffers {
     size_t pixels, chunks;
 } es_reflecting_buffers;
 
+/* Memory that surfaces of one size are lit in (gi/reflections/found_light.h). */
+typedef struct es_found_light {
+    es_layer_light lamps, indirect;
+    es_planes direct;
+    size_t pixels;
+} es_found_light;
+
+/* What rays have met, and what it sends back (gi/reflections/traced.h). Of the size of the rectangle that they began in. */
+typedef struct es_traced_level {
+    es_gbuffer hits;            /* depth: distance along the ray, metres; 0 where none is, or it has met nothing */
+    es_planes found, along;     /* positions, relative to the world's origin; directions, unit */
+    es_planes background;       /* radiance of rays that have met nothing */
+    es_planes weight;           /* of the ray among those of its pixel */
+    es_planes radiance, second; /* of the hits; what they reflect of others */
+    es_planes sum, weights;     /* over a pixel's rays */
+    es_reflecting_buffers reflecting;
+    es_found_light light;
+} es_traced_level;
+
 typedef struct es_reflections {
     /* things that have maps, in no particular order */
     es_reflection_map* maps;
@@ -53,8 +72,11 @@ typedef struct es_reflections {
     es_draw_list others;        /* all but the thing itself */
     es_raster_instance* instances;
     size_t instance_capacity;
-    es_layer_light lamps, indirect;
-    es_planes background, direct, radiance;
+    es_found_light face_light;
+    es_planes background, radiance;
+
+    es_traced_level levels[2];
+    bool wants_rays;            /* in this frame */
 
     es_reflecting_buffers on_face, on_picture;
     es_planes light;            /* reflected radiance */
