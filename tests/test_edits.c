@@ -14,6 +14,7 @@
 #include "platform/maths.h"
 #include "platform/random.h"
 #include "sim/sim.h"
+#include "tests/races.h"
 
 typedef struct scene { es_context* context; es_world* world; es_mesh mesh; es_node node; es_instance mirror, other; es_camera camera; es_node camera_node; } scene;
 
@@ -175,6 +176,91 @@ static void test_regions_have_influence_where_they_are(void** state)
     assert_int_equal(list->region_count, 3);
     assert_true(list->regions[0].instance == ES_EVERY_INSTANCE && list->regions[1].distances && list->regions[2].stroke_count == 2 && list->regions[2].strokes[1].erase);
     close_scene(&s);
+}
+
+/* Small regions in large triangles, across their edges; regions of no size. */
+static void test_geodesic_regions_reach_over_edges(void** state)
+{
+    scene s = open_scene();
+    es_region region = add_region(&s, ES_REGION_GEODESIC, 0.1f);
+    es_region_desc d;
+    for (uint32_t i = 0; i < 300; i++) {
+        const double x = 1.8 * (double)es_random_float(1, i) - 0.9, y = 1.8 * (double)es_random_float(2, i) - 0.9, radius = 0.01 + 0.2 * (double)es_random_float(3, i);
+        const double dx = 1.2 * radius * (2 * (double)es_random_float(4, i) - 1), dy = 1.2 * radius * (2 * (double)es_random_float(5, i) - 1);
+        assert_int_equal(es_world_get_region(s.world, region, &d), ES_OK);
+        d.centre = anchor_at(&s, s.mirror, x, y, 0);
+        d.radius = (float)radius;
+        d.border = 0.5f * (float)radius;
+        assert_int_equal(es_world_set_region(s.world, region, &d), ES_OK);
+        es_anchor at = anchor_at(&s, s.mirror, x + dx, y + dy, 0);
+        if (fabs(x + dx) > 1 || fabs(y + dy) > 1) continue;
+        double t = fmin(1, fmax(0, (hypot(dx, dy) - 0.5 * radius) / (0.5 * radius))), exact = 1 - t * t * (3 - 2 * t);
+        if (fabs((double)es_world_region_influence(s.world, region, &at) - exact) > 2e-3) fail_msg("%u: influence %g, not %g, at %g of %g m", i, (double)es_world_region_influence(s.world, region, &at), exact, hypot(dx, dy), radius);
+    }
+    d.radius = 0;
+    assert_int_equal(es_world_set_region(s.world, region, &d), ES_OK);
+    assert_true(es_world_region_influence(s.world, region, &d.centre) == 0);
+    assert_int_equal(es_world_edits(s.world)->region_count, 1); /* it covers nothing, but is there */
+    d.radius = 0.5f;
+    assert_int_equal(es_world_set_region(s.world, region, &d), ES_OK);
+    es_transform none = {{0, 0, 0}, {0, 0, 0, 1}, {0, 0, 0}};
+    assert_int_equal(es_world_set_node_transform(s.world, s.node, &none), ES_OK); /* a surface of no size */
+    assert_true(es_world_region_influence(s.world, region, &d.centre) == 1);
+    close_scene(&s);
+}
+
+/* A skinned mesh: asked first, before anything else has computed its vertices. */
+static void test_handles_follow_skins(void** state)
+{
+    es_context* context;
+    es_world* world;
+    es_context_desc context_desc = es_default_context_desc();
+    context_desc.threads = 2;
+    es_world_settings settings = es_default_world_settings();
+    settings.triangles = 3000;
+    assert_int_equal(es_context_create(&context_desc, &context), ES_OK);
+    assert_int_equal(es_world_create_scene(context, "creature", &settings, &world), ES_OK);
+    uint32_t skin, ids[256];
+    size_t count = 1, instances = 256;
+    es_skin_state skinned;
+    assert_int_equal(es_world_enumerate(world, ES_OBJECT_SKIN, &skin, &count), ES_OK);
+    assert_int_equal(es_world_get_skin(world, (es_skin){skin}, &skinned), ES_OK);
+    assert_int_equal(es_world_enumerate(world, ES_OBJECT_INSTANCE, ids, &instances), ES_OK);
+    es_instance_desc desc = {{0}};
+    size_t i = 0;
+    while (i < instances && (es_world_get_instance(world, (es_instance){ids[i]}, &desc), desc.mesh.id != skinned.mesh.id)) i++;
+    assert_true(i < instances);
+    es_anchor anchor;
+    es_region region;
+    assert_int_equal(es_world_anchor_of_triangle(world, (es_instance){ids[i]}, 17, 0.25f, 0.5f, &anchor), ES_OK);
+    assert_int_equal(es_world_add_region(world, &(es_region_desc){.type = ES_REGION_GEODESIC, .centre = anchor, .radius = 0.2f, .border = 0.1f}, &region), ES_OK);
+    uint64_t before = 0;
+    double moved = 0, last[3] = {0};
+    for (int step = 0; step < 5; step++) {
+        double place[3];
+        es_mat4 m;
+        assert_int_equal(es_world_step(world, 0.1f), ES_OK);
+        assert_true(es_world_resolve_anchor(world, &anchor, place, NULL));
+        assert_true(es_world_region_influence(world, region, &anchor) == 1);
+        assert_true(es_world_get_revisions(world).edits != before);
+        before = es_world_get_revisions(world).edits;
+        const es_raster_mesh* mesh = es_world_mesh(world, skinned.mesh);
+        assert_int_equal(es_world_get_node_matrix(world, desc.node, &m), ES_OK);
+        for (int k = 0; k < 3; k++) {
+            double sum = m.m[12 + k];
+            for (int axis = 0; axis < 3; axis++) {
+                const float w[3] = {0.25f, 0.25f, 0.5f};
+                for (int c = 0; c < 3; c++) sum += (double)m.m[4 * axis + k] * (double)w[c] * (double)mesh->positions[4 * mesh->indices[3 * 17 + c] + (uint32_t)axis];
+            }
+            assert_true(fabs(place[k] - sum) < 1e-5);
+            moved += step ? fabs(place[k] - last[k]) : 0;
+            last[k] = place[k];
+        }
+    }
+    assert_true(moved > 1e-3);
+    es_world_destroy(world);
+    assert_int_equal(es_context_bytes(context), 0);
+    es_context_destroy(context);
 }
 
 static void test_stale_edits_have_no_effect_and_say_why(void** state)
@@ -612,6 +698,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_handles_follow_their_surfaces),
         cmocka_unit_test(test_regions_have_influence_where_they_are),
+        cmocka_unit_test(test_geodesic_regions_reach_over_edges),
+        cmocka_unit_test(test_handles_follow_skins),
         cmocka_unit_test(test_stale_edits_have_no_effect_and_say_why),
         cmocka_unit_test(test_bad_numbers_are_refused),
         cmocka_unit_test(test_the_list_counts_what_differs),
@@ -622,7 +710,7 @@ int main(void)
         cmocka_unit_test(test_undo_takes_back_and_redo_does_again),
         cmocka_unit_test(test_history_keeps_within_its_memory),
         cmocka_unit_test(test_a_thousand_constraints),
-        cmocka_unit_test(test_without_memory_nothing_is_half_done),
+        unit_test_without_races(test_without_memory_nothing_is_half_done),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -63,12 +63,14 @@ typedef struct geodesic {
     const es_surface* surface;
     float* points;            /* 4 per point: stretched place, distance */
     uint32_t *list, *pending; /* of points */
+    uint32_t* reached;        /* those that the front has come to, in that order */
+    uint32_t reached_count;
     float* results;
     uint8_t* marks;           /* per point */
     size_t bytes;
     void* memory;
     double factor[6], centre[3], unit; /* lengths here × unit = the world's */
-    float longest, mean;      /* of edges */
+    float mean;               /* length of edges */
 } geodesic;
 
 enum { PENDING = 1, LISTED = 2 };
@@ -91,14 +93,15 @@ static void stretch_body(void* user, uint32_t begin, uint32_t end, uint32_t work
 static bool begin_geodesic(es_context* context, const es_surface* surface, const double metric[6], geodesic* g)
 {
     const size_t count = surface->fans.point_count;
-    *g = (geodesic){.context = context, .surface = surface, .unit = 1, .bytes = (count + 16) * (4 * sizeof(float) + 3 * sizeof(uint32_t) + 1)};
+    *g = (geodesic){.context = context, .surface = surface, .unit = 1, .bytes = (count + 16) * (4 * sizeof(float) + 4 * sizeof(uint32_t) + 1)};
     g->memory = es_allocate(context, g->bytes);
     if (!g->memory) return false;
     g->points = g->memory;
     g->list = (uint32_t*)(g->points + 4 * (count + 16));
     g->pending = g->list + count + 16;
     g->results = (float*)(g->pending + count + 16);
-    g->marks = (uint8_t*)(g->results + count + 16);
+    g->reached = (uint32_t*)(g->results + count + 16);
+    g->marks = (uint8_t*)(g->reached + count + 16);
     memset(g->marks, 0, count);
     factor_of(metric, g->factor);
     const es_raster_mesh* mesh = surface->raster;
@@ -124,20 +127,28 @@ static float edge_length(const geodesic* g, uint32_t a, uint32_t b)
     return es_sqrt(x * x + y * y + z * z);
 }
 
-/* The mean of at most 4096 points' edges is enough to step by; the longest is asked for only where a field ends. */
-static void measure_edges(geodesic* g, bool longest)
+/* Of at most 4096 points, which is enough to step by. */
+static float mean_edge(const geodesic* g)
 {
     const es_surface_fans* f = &g->surface->fans;
     double sum = 0;
     uint32_t number = 0, step = f->point_count / 4096 + 1;
-    for (uint32_t i = 0; i < f->point_count; i += longest ? 1 : step)
-        for (uint32_t k = f->first_neighbour[i]; k < f->first_neighbour[i + 1]; k++) {
-            float length = edge_length(g, i, f->neighbours[k]);
-            sum += (double)length;
-            number++;
-            if (length > g->longest) g->longest = length;
-        }
-    g->mean = number ? (float)(sum / (double)number) : 1;
+    for (uint32_t i = 0; i < f->point_count; i += step)
+        for (uint32_t k = f->first_neighbour[i]; k < f->first_neighbour[i + 1]; k++, number++) sum += (double)edge_length(g, i, f->neighbours[k]);
+    return number ? (float)(sum / (double)number) : 1;
+}
+
+/* Of the points that the front has come to within the limit. */
+static float longest_edge(const geodesic* g, float limit)
+{
+    const es_surface_fans* f = &g->surface->fans;
+    float longest = 0;
+    for (uint32_t i = 0; i < g->reached_count; i++) {
+        const uint32_t p = g->reached[i];
+        if (g->points[4 * (size_t)p + 3] > limit) continue;
+        for (uint32_t k = f->first_neighbour[p]; k < f->first_neighbour[p + 1]; k++) longest = es_maxf(longest, edge_length(g, p, f->neighbours[k]));
+    }
+    return longest;
 }
 
 /* ---- the front ---------------------------------------------------------------------------------------------------------------- */
@@ -150,7 +161,8 @@ static void front_body(void* user, uint32_t begin, uint32_t end, uint32_t worker
     es_sim_kernel_table(es_context_isa(g->context))->geodesic_front(&job, begin, end);
 }
 
-static void run_front(geodesic* g, uint32_t pending, float limit)
+/* Until everything within the limit is settled. `pending` of those that have fallen and not been gone on from; returns how many there are now, to go on further. */
+static uint32_t run_front(geodesic* g, uint32_t pending, float limit)
 {
     const es_surface_fans* f = &g->surface->fans;
     float* points = g->points;
@@ -183,12 +195,14 @@ static void run_front(geodesic* g, uint32_t pending, float limit)
             g->marks[p] &= (uint8_t)~LISTED;
             /* what rounding takes away must not go round in circles */
             if (!(g->results[i] < *distance * (1.0f - 1e-6f))) continue;
+            if (*distance == ES_GEODESIC_FAR) g->reached[g->reached_count++] = p;
             *distance = g->results[i];
             if (g->marks[p] & PENDING) continue;
             g->marks[p] |= PENDING;
             g->pending[pending++] = p;
         }
     }
+    return pending;
 }
 
 /* ---- along edges ---------------------------------------------------------------------------------------------------------------- */
@@ -275,8 +289,8 @@ bool es_geodesic_compute(es_context* context, const es_surface* surface, const e
     if (!begin_geodesic(context, surface, key->metric, &g)) return false;
     float limit = 0.5f * ES_GEODESIC_FAR;
     const bool bounded = key->max_distance > 0;
-    measure_edges(&g, bounded && whole_triangles);
-    if (bounded && (double)key->max_distance / g.unit < 1e6) limit = (float)((double)key->max_distance / g.unit) * (1 + 1e-6f) + (whole_triangles ? g.longest : 0);
+    g.mean = mean_edge(&g);
+    if (bounded && (double)key->max_distance / g.unit < 1e6) limit = (float)((double)key->max_distance / g.unit) * (1 + 1e-6f);
     const es_surface_fans* f = &surface->fans;
     const uint32_t* corner = surface->raster->indices + 3 * (size_t)key->triangle;
     const float w[3] = {1.0f - key->u - key->v, key->u, key->v};
@@ -307,8 +321,21 @@ bool es_geodesic_compute(es_context* context, const es_surface* surface, const e
             if (g.marks[p] & PENDING) continue;
             g.marks[p] |= PENDING;
             g.pending[pending++] = p;
+            g.reached[g.reached_count++] = p;
         }
-        run_front(&g, pending, limit);
+        if (!(bounded && whole_triangles)) {
+            run_front(&g, pending, limit);
+        } else {
+            /* A triangle that the field reaches into has its corners within its longest edge of that; its edges end at corners of the triangle through which
+             * the way to it leads, and so on back to the source's. */
+            const float radius = limit, own = es_maxf(to[0], es_maxf(to[1], to[2]));
+            float next = es_maxf(radius, own);
+            do {
+                limit = next;
+                pending = run_front(&g, pending, limit);
+                next = radius + es_maxf(longest_edge(&g, limit), own);
+            } while (next > limit);
+        }
     }
     spread_loop loop = {&g, limit, distances};
     es_parallel_for(context, f->vertex_count, 8192, spread_body, &loop);

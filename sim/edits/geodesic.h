@@ -25,7 +25,8 @@ typedef struct es_geodesic_field {
 bool es_geodesic_field_refresh(es_world* world, es_surfaces* surfaces, es_geodesic_field* field, const es_anchor* anchor, float radius, bool* changed);
 void es_geodesic_field_free(es_context* context, es_geodesic_field* field);
 
-/* distances: per vertex of the surface's mesh; scratch comes from the context. max_distance: 0 or less: everywhere. False after es_fail. */
+/* distances: per vertex of the surface's mesh; scratch comes from the context. max_distance: 0 or less: everywhere. whole_triangles, of the front: on to every corner of the
+ * triangles that reach into that. False after es_fail. */
 bool es_geodesic_compute(es_context* context, const es_surface* surface, const es_geodesic_key* key, bool whole_triangles, float* distances);
 
 /* For the kernel: points [begin, end) of `list` get in `results` the least distance that the corners round them allow. Points are records of x y z and distance;

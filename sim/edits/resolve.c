@@ -116,7 +116,7 @@ static es_edit_effect resolve_region(es_world* world, es_region_object* region, 
     if (d->type != ES_REGION_GEODESIC) return ES_EDIT_ACTIVE;
     if (d->centre.kind != ES_ANCHOR_SURFACE) return ES_EDIT_UNPLACED;
     out->instance = es_slot_of(d->centre.instance.id);
-    return es_geodesic_field_refresh(world, &world->edits->surfaces, &region->field, &d->centre, d->radius, changed) ? ES_EDIT_ACTIVE : ES_EDIT_NO_MEMORY;
+    return es_geodesic_field_refresh(world, &world->edits->surfaces, &region->field, &d->centre, d->radius > 0 ? d->radius : 1e-30f, changed) ? ES_EDIT_ACTIVE : ES_EDIT_NO_MEMORY;
 }
 
 /* ---- constraints ---------------------------------------------------------------------------------------------------------- */
