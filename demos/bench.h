@@ -135,6 +135,9 @@ size_t bench_rays_rows(bench_row* rows, size_t capacity);
 int bench_geodesic(const bench_options* options);
 size_t bench_geodesic_rows(bench_row* rows, size_t capacity);
 
+/* bench_glare.c */
+int bench_glare(const bench_options* options);
+size_t bench_glare_rows(bench_row* rows, size_t capacity);
 /* bench_fft.c */
 int bench_fft(const bench_options* options);
 size_t bench_fft_rows(bench_row* rows, size_t capacity);

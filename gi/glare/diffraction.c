@@ -55,6 +55,7 @@ es_result es_diffraction_update(es_context* context, const es_aperture* aperture
     es_result result = resize(context, size, d);
     if (result) return result;
     d->width = aperture->width;
+    d->symmetric = defocus == 0;
     float* room = d->power + d->stride * size;
     float *across = room + es_fft_stride(size) * size, *down = across + 2 * (size_t)size;
     if (defocus != 0) phase_factors(size, aperture->width, defocus, across, down);
@@ -242,8 +243,8 @@ static void groups(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 
 es_result es_glare_spectrum_update(es_context* context, const es_diffraction* d, const es_chromatic_blur* blur, es_glare_spectrum* spectrum)
 {
-    const uint32_t columns = 2 * blur->reach_x + 1, rows = 2 * blur->reach_y + 1, row_groups = (rows + 7) / 8;
-    const size_t stride = (columns + 15) / 16 * 16, plane = stride * row_groups * 8, bytes = 3 * plane * sizeof(float);
+    const uint32_t columns = 2 * blur->reach_x + 1, rows = 2 * blur->reach_y + 1, row_groups = ((d->symmetric ? blur->reach_y + 1 : rows) + 7) / 8;
+    const size_t stride = (columns + 15) / 16 * 16, plane = stride * rows, bytes = 3 * plane * sizeof(float);
     if (spectrum->bytes != bytes || spectrum->stride != stride) {
         es_glare_spectrum_free(context, spectrum);
         spectrum->memory = es_allocate(context, bytes);
@@ -253,7 +254,7 @@ es_result es_glare_spectrum_update(es_context* context, const es_diffraction* d,
     }
     spectrum->reach_x = blur->reach_x;
     spectrum->reach_y = blur->reach_y;
-    es_chromatic_job job = {.power = d->power, .power_stride = d->stride, .blur = blur, .stride = stride, .scale = (float)(1 / d->paired), .column_begin = d->size};
+    es_chromatic_job job = {.power = d->power, .power_stride = d->stride, .blur = blur, .stride = stride, .symmetric = d->symmetric, .scale = (float)(1 / d->paired), .column_begin = d->size};
     for (int k = 0; k < 3; k++) spectrum->at[k] = job.to[k] = (float*)spectrum->memory + k * plane;
     for (uint32_t i = 0; i < blur->wavelengths; i++)
         for (uint32_t x = blur->reach - blur->reach_x; x <= blur->reach + blur->reach_x; x++) {

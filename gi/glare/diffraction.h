@@ -25,6 +25,7 @@ typedef struct es_diffraction {
     float width;               /* of the aperture's plane, m: a pixel is ES_GLARE_WAVELENGTH / width radians */
     float* power;
     size_t stride;             /* floats from row to row */
+    bool symmetric;            /* as strong at (-k, -l) as at (k, l): without defocus */
     double total;              /* sum of it, more than 0 */
     double paired;             /* the same without row 0 and column 0, which have no partners on the other side; more than 0 */
     void* memory;
@@ -92,7 +93,8 @@ typedef struct es_chromatic_job {
     float scale;                       /* of it */
     const es_chromatic_blur* blur;
     uint32_t column_begin, column_end; /* of the power spectrum that any pixel reads; multiples of eight */
-    float* to[3];                      /* rows up to a multiple of eight */
+    bool symmetric;                    /* to the middle: rows after its are made of those before it */
+    float* to[3];
     size_t stride;
 } es_chromatic_job;
 
