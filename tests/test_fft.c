@@ -71,7 +71,7 @@ static double* slow_transform(const complex_picture* p, int sign)
             double sum_re = 0, sum_im = 0;
             for (uint32_t y = 0; y < h; y++) {
                 const double a = sign * 2 * PI * (double)((uint64_t)y * k % h) / h, c = cos(a), s = sin(a);
-                const double *m = middle + 2 * ((size_t)y * w + x);
+                const double* m = middle + 2 * ((size_t)y * w + x);
                 sum_re += m[0] * c - m[1] * s;
                 sum_im += m[0] * s + m[1] * c;
             }
