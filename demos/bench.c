@@ -44,6 +44,7 @@ static const benchmark benchmarks[] = {
     {"screen", bench_screen, bench_screen_rows, false},
     {"compensation", bench_compensation, bench_compensation_rows, false},
     {"second-order", bench_second_order, bench_second_order_rows, false},
+    {"edits", bench_edits, bench_edits_rows, false},
     {"combinations", bench_combinations, bench_combinations_rows, false},
     {"glare", bench_glare, bench_glare_rows, false},
     {"scale", bench_scale, bench_scale_rows, false},

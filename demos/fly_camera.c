@@ -59,6 +59,20 @@ int fly_camera_place(fly_camera* fly, es_world* world)
     return es_world_set_active_camera(world, fly->own) == ES_OK ? DEMO_OK : DEMO_BAD_INPUT;
 }
 
+int fly_camera_go(fly_camera* fly, es_world* world, const double position[3], es_vec3 direction, float fov_y)
+{
+    es_camera_desc camera;
+    fly->position = (es_vec3){(float)position[0], (float)position[1], (float)position[2]};
+    fly->yaw = atan2f(-direction.x, -direction.z);
+    fly->pitch = atan2f(direction.y, hypotf(direction.x, direction.z));
+    fly->flying = true;
+    if (fov_y > 0 && es_world_get_camera(world, fly->own, &camera) == ES_OK) {
+        camera.fov_y = fov_y;
+        if (es_world_set_camera(world, fly->own, &camera) != ES_OK) return DEMO_BAD_INPUT;
+    }
+    return fly_camera_place(fly, world);
+}
+
 static float held(const es_window_input* input, int forward, int backward)
 {
     return (float)input->down[forward] - (float)input->down[backward];

@@ -20,6 +20,8 @@ int fly_camera_update(fly_camera* fly, es_world* world, const es_window_input* i
 int fly_camera_place(fly_camera* fly, es_world* world);
 /* Takes over from wherever the world's camera is, ours or the scene's: after a replay. */
 void fly_camera_adopt(fly_camera* fly, es_world* world);
+/* To a place, looking along a direction; fov_y 0: as it is. */
+int fly_camera_go(fly_camera* fly, es_world* world, const double position[3], es_vec3 direction, float fov_y);
 int fly_camera_reset(fly_camera* fly, es_world* world);
 
 #endif

@@ -80,6 +80,7 @@ static int draw(player* p)
     double start = demo_seconds();
     ui_draw_on(&p->ui, &p->canvas);
     player_hand_draw(p);
+    player_edits_draw(p);
     player_build_panels(p);
     ui_end(&p->ui);
     p->interface_milliseconds += ((demo_seconds() - start) * 1000 - p->interface_milliseconds) * 0.1;
@@ -164,7 +165,7 @@ static void take_waiting(player* p)
         player_take_keys(p, &input);
         leave_commands(p, &input);
         const bool clicked = input.mouse_pressed[0] || input.mouse_pressed[2] || input.mouse_released[0];
-        if (clicked && !player_split_drag(p, &input) && !p->replaying) player_hand_update(p, &input);
+        if (clicked && !player_split_drag(p, &input) && !p->replaying && !player_edits_update(p, &input)) player_hand_update(p, &input);
         ui_draw_on(&p->ui, &p->canvas);
         player_build_panels(p);
         ui_end(&p->ui);
@@ -179,9 +180,9 @@ static int play_frame(player* p, float elapsed)
     es_window_input input = ui_game_input(&p->ui);
     player_take_keys(p, &input);
     leave_commands(p, &input);
-    bool mouse_taken = player_split_drag(p, &input) || (!p->replaying && player_hand_update(p, &input));
+    bool mouse_taken = player_split_drag(p, &input) || (!p->replaying && (player_edits_update(p, &input) || player_hand_update(p, &input)));
     if (mouse_taken) memset(input.mouse_down, 0, sizeof input.mouse_down);
-    if (p->hand.what && p->hand.by_keyboard) input.down[ES_KEY_LEFT] = input.down[ES_KEY_RIGHT] = input.down[ES_KEY_UP] = input.down[ES_KEY_DOWN] = false;
+    if ((p->hand.what && p->hand.by_keyboard) || (p->edits.held && p->edits.by_keyboard)) input.down[ES_KEY_LEFT] = input.down[ES_KEY_RIGHT] = input.down[ES_KEY_UP] = input.down[ES_KEY_DOWN] = false;
     if (!p->replaying && fly_camera_update(&p->nodes.fly, p->session.world, &input, elapsed) != DEMO_OK) return demo_refuse_context(p->session.context);
     if (advance(p, elapsed) != DEMO_OK || draw(p) != DEMO_OK) return DEMO_BAD_INPUT;
     if (!p->wanted_scene[0]) return DEMO_OK;

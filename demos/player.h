@@ -3,6 +3,7 @@
 #define EARTHSHINE_DEMO_PLAYER_H
 
 #include "demo.h"
+#include "player_edits.h"
 #include "player_history.h"
 #include "player_nodes.h"
 #include "ui_plot.h"
@@ -59,7 +60,7 @@ typedef struct player_hand {
     double cross_until;          /* the middle of the picture is marked until then */
 } player_hand;
 
-typedef struct player {
+struct player {
     demo_options options;
     char scene[DEMO_PATH_SIZE];  /* name or file */
     demo_session session;
@@ -89,6 +90,7 @@ typedef struct player {
     player_graphs graphs;
     player_capture capture;
     player_hand hand;
+    player_edits edits;
     char notice[256];
     double notice_until;
     bool hint;                /* the notice is the one about keys, of the start */
@@ -97,7 +99,7 @@ typedef struct player {
     char search[UI_EDIT_SIZE];
     bool only_changed;
     char wanted_scene[DEMO_PATH_SIZE]; /* to be opened at the frame's end; "" none */
-} player;
+};
 
 /* A line that shows for a few seconds. */
 void player_notice(player* p, const char* format, ...) ES_PRINTF(2, 3);

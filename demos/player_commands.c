@@ -40,9 +40,13 @@ static void do_smaller(player* p) { p->ui.larger -= p->ui.scale > 1; }
 /* The innermost first: what is held, then the panels, then the program. */
 static void do_escape(player* p)
 {
-    bool* panels[] = {&p->show_settings, &p->show_scenes, &p->show_graphs, &p->show_micro, &p->show_help};
+    bool* panels[] = {&p->show_settings, &p->show_scenes, &p->show_graphs, &p->show_micro, &p->show_help, &p->edits.shown};
     if (p->hand.what) {
         player_release(p);
+        return;
+    }
+    if (p->edits.held) {
+        p->edits.held = HANDLE_NONE;
         return;
     }
     for (size_t i = 0; i < sizeof panels / sizeof panels[0]; i++)
@@ -82,8 +86,10 @@ static void wind(player* p, int states)
     p->paused = true;
     p->steps = 0;
     player_release(p);
+    player_keep_edits(p, false);
     if (history_go(h, p->session.world, at < 0 ? 0 : (uint32_t)at) != ES_OK) player_notice(p, "%s", es_context_message(p->session.context));
     player_release(p);
+    player_keep_edits(p, true);
     fly_camera_place(&p->nodes.fly, p->session.world);
     p->world = es_world_get_settings(p->session.world);
 }
@@ -139,6 +145,22 @@ static void do_unhook(player* p) { player_unhook(p); }
 static void do_hold_light(player* p) { player_hold_next_light(p); }
 static void do_lights_home(player* p) { player_lights_home(p); }
 static void do_show_lights(player* p) { p->hand.show_lights = !p->hand.show_lights; }
+
+static void do_reflections(player* p)
+{
+    p->edits.shown = !p->edits.shown;
+    if (p->edits.shown) p->hide_all = false;
+}
+static void do_add_constraint(player* p) { player_add_constraint(p); }
+static void do_add_region(player* p) { player_add_region(p); }
+static void do_next_handle(player* p) { player_hold_next_handle(p); }
+static void do_delete_edit(player* p) { player_delete_edit(p); }
+static void do_freeze(player* p) { player_freeze(p); }
+static void do_return_to_view(player* p) { player_return_to_view(p); }
+static void do_undo(player* p) { player_undo_edit(p); }
+static void do_redo(player* p) { player_redo_edit(p); }
+static void do_save_edits(player* p) { player_save_edits(p); }
+static void do_load_edits(player* p) { player_load_edits(p); }
 
 static void do_png(player* p) { player_screenshot(p, false); }
 static void do_exr(player* p) { player_screenshot(p, true); }
@@ -197,6 +219,17 @@ static const command commands[] = {
     {0, PLAIN, false, NULL, "wheel PgUp PgDn", "nearer, farther"},
     {'J', PLAIN, false, do_show_lights, "J", "show the lights, to drag them"},
     {'J', CONTROL, false, do_lights_home, "Ctrl J", "lights back to their places"},
+    {0, PLAIN, false, NULL, NULL, "Reflections"},
+    {'E', CONTROL, false, do_reflections, "Ctrl E", "edit them: panel and handles"},
+    {0, PLAIN, false, NULL, "drag", "red: where; green: what; blue: region"},
+    {'N', CONTROL, false, do_add_constraint, "Ctrl N", "a constraint in the middle"},
+    {'G', CONTROL, false, do_add_region, "Ctrl G", "a region in the middle"},
+    {'H', CONTROL, false, do_next_handle, "Ctrl H", "hold the next handle"},
+    {'K', CONTROL, false, do_delete_edit, "Ctrl K", "delete what is chosen"},
+    {'F', CONTROL, false, do_freeze, "Ctrl F", "freeze, as seen from here"},
+    {'V', CONTROL, false, do_return_to_view, "Ctrl V", "return to a constraint's view"},
+    {'Z', CONTROL, true, do_undo, "Ctrl Z Y", "undo, redo"},
+    {'W', CONTROL, false, do_save_edits, "Ctrl W L", "save, load"},
     {0, PLAIN, false, NULL, NULL, "Picture"},
     {'L', PLAIN, false, do_light_part, "L", "light: all, direct, indirect"},
     {'I', PLAIN, false, do_image, "I 1 … 9", "next image, by number"},
@@ -224,6 +257,8 @@ static const command commands[] = {
     {'-', CONTROL, true, do_smaller, "", NULL},
     {ES_KEY_BACKSPACE, PLAIN, true, do_back, "", NULL},
     {'X', PLAIN, false, do_faster, "", NULL},
+    {'Y', CONTROL, true, do_redo, "", NULL},
+    {'L', CONTROL, false, do_load_edits, "", NULL},
     {'P', PLAIN, false, do_points, "", NULL},
     {'+', PLAIN, true, do_brighter, "", NULL},
     {'-', PLAIN, true, do_darker, "", NULL},
@@ -242,7 +277,7 @@ bool player_command_text(size_t index, const char** key, const char** text)
 /* A replay is what was recorded and nothing else. */
 static bool changes_world(const command* c)
 {
-    void (*const all[])(player*) = {do_slower, do_faster, do_normal, do_back, do_forth, do_start, do_camera, do_grab, do_throw, do_tear, do_unhook, do_hold_light, do_lights_home};
+    void (*const all[])(player*) = {do_slower, do_faster, do_normal, do_back, do_forth, do_start, do_camera, do_grab, do_throw, do_tear, do_unhook, do_hold_light, do_lights_home, do_add_constraint, do_add_region, do_next_handle, do_delete_edit, do_freeze, do_return_to_view, do_undo, do_redo, do_load_edits};
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         if (c->run == all[i]) return true;
     return false;

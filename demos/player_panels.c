@@ -31,6 +31,7 @@ static void top_bar(player* p)
     if (ui_switch(u, "graphs", 7, "Graphs", p->show_graphs)) p->show_graphs = !p->show_graphs;
     if (ui_switch(u, "split", p->split.mode ? 17 : 6, split_name(p->split.mode), p->split.mode != SPLIT_OFF)) player_next_split(p);
     if (ui_switch(u, "lights", 7, "Lights", p->hand.show_lights)) p->hand.show_lights = !p->hand.show_lights;
+    if (ui_switch(u, "reflections", 12, "Reflections", p->edits.shown)) p->edits.shown = !p->edits.shown;
     if (ui_button(u, "shot", 4, "PNG")) player_screenshot(p, false);
     if (ui_button(u, "exr", 4, "EXR")) player_screenshot(p, true);
     if (ui_switch(u, "sequence", 4, "Rec", p->capture.recording)) player_toggle_sequence(p);
@@ -206,6 +207,10 @@ void player_build_panels(player* p)
         player_graphs_panel(p, (canvas_rect){0, bottom - height, width, height});
     }
     if (p->show_micro) player_micro_panel(p, bottom);
+    if (p->edits.shown) {
+        const int width = columns(p, 44), height = 9 * u->row + 12 * u->scale;
+        player_edits_panel(p, (canvas_rect){0, bottom - height, width, height});
+    }
     if (p->show_settings) {
         int width = columns(p, 48), left = (int)p->canvas.width - width;
         player_settings_panel(p, (canvas_rect){left > 0 ? left : 0, top, width, bottom - top});

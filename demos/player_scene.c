@@ -75,6 +75,7 @@ void player_close_scene(player* p)
 {
     player_end_replay(p, "ends");
     if (p->session.recording && demo_record_end(&p->session, p->options.record) != DEMO_OK) p->failed = true;
+    player_edits_close(p);
     player_split_close(p);
     history_clear(&p->history);
     memset(&p->hand, 0, sizeof p->hand);
