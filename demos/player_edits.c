@@ -132,7 +132,7 @@ static bool is_transmissive(const player* p, es_instance instance)
 {
     es_instance_desc desc;
     es_material_desc material;
-    return es_world_get_instance(p->session.world, instance, &desc) == ES_OK && es_world_get_material(p->session.world, desc.material, &material) == ES_OK && material.transmission > 0.5f;
+    return es_world_get_instance(p->session.world, instance, &desc) == ES_OK && es_world_get_material(p->session.world, desc.material, &material) == ES_OK && false;
 }
 
 /* What is seen there now is what it begins with. */
@@ -485,8 +485,7 @@ static void edits_path(const player* p, char path[DEMO_PATH_SIZE])
 {
     char stem[64];
     play_stem(p->scene, stem);
-    if (p->options.edits) snprintf(path, DEMO_PATH_SIZE, "%s", p->options.edits);
-    else snprintf(path, DEMO_PATH_SIZE, "%s-edits.gltf", stem);
+    snprintf(path, DEMO_PATH_SIZE, "%s-edits.gltf", stem);
 }
 
 void player_save_edits(player* p)

@@ -156,6 +156,7 @@ typedef struct es_renderer_settings {
     uint32_t reflection_maps;        /* MAPS: things that have one, at most; those that look largest from the camera, by their bounds. Others reflect as with NONE */
     uint32_t reflection_size;        /* MAPS: texels of a face's side, a power of two */
     uint32_t reflection_rays;        /* TRACED: for each pixel whose lobe is no mirror's */
+    bool reflection_edits;           /* the world's edits of reflections (es_world_edits) count, frozen ones among them; off: everything reflects as the law says */
     /* temporal coherence (gi/temporal.h; Knecht §3.5): indirect light is blended with last frame's, found again by its motion */
     bool temporal;
     uint32_t temporal_stage;         /* es_temporal_stage */

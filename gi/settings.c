@@ -112,6 +112,7 @@ static const es_setting renderer_table[] = {
     {"reflections", ES_SETTING_CHOICE, "none", 0, 0, "none|maps|traced", "what mirrors and glossy things show of what is around them: nothing but highlights of lights, or a picture, looked up in a cube map of each thing's surroundings or found by rays", AT(reflections)},
     {"reflections.roughness", ES_SETTING_FLOAT, "0.3", 0, 1, NULL, "surfaces of at most this roughness reflect a picture", AT(reflection_roughness)},
     {"reflections.maps", ES_SETTING_INT, "8", 1, ES_REFLECTION_MOST_MAPS, NULL, "reflections maps: things that have a map, at most; those that look largest", AT(reflection_maps)},
+    {"reflections.edits", ES_SETTING_BOOL, "true", 0, 1, NULL, "what the world's regions and constraints say reflects where they say, highlights and micro-buffers as well; off: as the law of reflection has it", AT(reflection_edits)},
     {"reflections.size", ES_SETTING_INT, "256", 16, 1024, NULL, "reflections maps: texels of a side of each of a map's six faces, a power of two", AT(reflection_size)},
     {"reflections.rays", ES_SETTING_INT, "4", 1, 256, NULL, "reflections traced: rays for each pixel whose lobe is no mirror's", AT(reflection_rays)},
 

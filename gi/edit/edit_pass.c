@@ -7,6 +7,7 @@ static es_edit_job job_of(const es_renderer* r, const es_edit_field* field)
 
 static const char* nothing(const es_renderer* r, const es_edit_list* edits)
 {
+    if (!r->settings.reflection_edits) return "reflections.edits is off";
     if (!edits->frozen && !(edits->region_count && edits->constraint_count)) return "no reflection is edited";
     return NULL;
 }
@@ -52,7 +53,7 @@ bool es_edits_refraction(const es_renderer* r, const es_world* world)
     const es_edit_list* edits = es_world_edits(world);
     bool any = false;
     for (uint32_t i = 0; i < edits->constraint_count; i++) any |= edits->constraints[i].refraction;
-    return any && edits->region_count;
+    return any && edits->region_count && r->settings.reflection_edits;
 }
 
 es_result es_edit_refraction(es_renderer* r, const es_frame_inputs* in, const es_world* world, es_edit_original original, const void* user, const float* const directions[3], float* const edited[3])

@@ -1,6 +1,7 @@
 /* A kitchen with pots that reflect it, after figure 7.7 of Ritschel's thesis: a large polished pot, a kettle, a bowl and pans on a table, a sink, a window with a sky and a
  * sun outside. The large pot turns on a lazy Susan with a smaller one beside it, pans swing from a rail. */
 #include "sim/scenes/body_tools.h"
+#include "sim/scenes/edit_tools.h"
 
 #include <string.h>
 
@@ -148,7 +149,8 @@ static void add_smooth_lathe(es_shape* shape, es_vec3 base, const es_vec2* profi
         }
 }
 
-static void add_pots(es_scene_builder* builder, const detail* d)
+/* pots: the large one, the kettle, the bowl */
+static void add_pots(es_scene_builder* builder, const detail* d, es_instance pots[3])
 {
     static const es_vec2 pot[] = {{0, 0}, {0.20f, 0}, {0.235f, 0.02f}, {0.25f, 0.08f}, {0.255f, 0.18f}, {0.25f, 0.29f}, {0.255f, 0.31f}, {0.262f, 0.32f}, {0.255f, 0.335f}, {0.20f, 0.365f}, {0.10f, 0.39f}, {0.03f, 0.40f}, {0.02f, 0.42f}, {0.035f, 0.445f}, {0, 0.46f}};
     static const es_vec2 kettle[] = {{0, 0}, {0.10f, 0}, {0.15f, 0.03f}, {0.17f, 0.10f}, {0.155f, 0.17f}, {0.10f, 0.22f}, {0.05f, 0.235f}, {0.03f, 0.25f}, {0.035f, 0.27f}, {0, 0.28f}};
@@ -172,7 +174,7 @@ static void add_pots(es_scene_builder* builder, const detail* d)
         es_node node = es_build_child(builder, names[i], tray, es_v3(places[i].x, 0.021f, places[i].z), es_quat_identity());
         es_shape shape = es_build_shape(builder);
         add_smooth_lathe(&shape, es_v3(0, 0, 0), profiles[i], counts[i], fine, round);
-        es_build_instance(builder, node, es_build_mesh(builder, names[i], &shape), materials[i]);
+        pots[i] = es_build_instance(builder, node, es_build_mesh(builder, names[i], &shape), materials[i]);
     }
     /* pans from a rail */
     es_shape rail = es_build_shape(builder);
@@ -189,6 +191,19 @@ static void add_pots(es_scene_builder* builder, const detail* d)
     }
 }
 
+/* §7.6.1: four constraints in three regions. They follow the pots as the tray turns. */
+static void edit_pots(es_scene_builder* builder, const es_instance pots[3], es_vec3 eye)
+{
+    const es_vec3 pot = {-0.14f, table_y + 0.021f, -0.06f}, kettle = {0.31f, table_y + 0.021f, -0.02f}, bowl = {0.14f, table_y + 0.021f, -0.42f};
+    es_build_region(builder, "large pot", ES_REGION_GEODESIC, pots[0], es_v3(pot.x + 0.09f, pot.y + 0.16f, pot.z + 0.24f), 0.24f, 0.10f);
+    es_build_constraint(builder, "the sink", pots[0], es_v3(pot.x + 0.06f, pot.y + 0.20f, pot.z + 0.25f), es_v3(0.75f, 0.98f, low_z + 0.2f), eye);
+    es_build_constraint(builder, "the jars", pots[0], es_v3(pot.x + 0.16f, pot.y + 0.20f, pot.z + 0.20f), es_v3(-1.15f, 1.0f, low_z + 0.3f), eye);
+    es_build_region(builder, "kettle", ES_REGION_GEODESIC, pots[1], es_v3(kettle.x + 0.01f, kettle.y + 0.12f, kettle.z + 0.17f), 0.14f, 0.06f);
+    es_build_constraint(builder, "the fruit", pots[1], es_v3(kettle.x + 0.01f, kettle.y + 0.13f, kettle.z + 0.16f), es_v3(0.37f, table_y + 0.045f, 0.52f), eye);
+    es_build_region(builder, "bowl", ES_REGION_EUCLIDEAN, pots[2], es_v3(bowl.x, bowl.y + 0.1f, bowl.z + 0.15f), 0.09f, 0.05f);
+    es_build_constraint(builder, "the window", pots[2], es_v3(bowl.x, bowl.y + 0.1f, bowl.z + 0.15f), es_v3(low_x, 1.5f, 0.0f), eye);
+}
+
 es_result es_scene_kitchen(es_world* world, uint32_t triangles)
 {
     enum { TRIANGLES = 300000 };
@@ -197,7 +212,8 @@ es_result es_scene_kitchen(es_world* world, uint32_t triangles)
     add_shell(&builder);
     add_table(&builder);
     add_sink(&builder, &d);
-    add_pots(&builder, &d);
+    es_instance pots[3] = {{0}};
+    add_pots(&builder, &d, pots);
     es_build_spot(&builder, es_v3(0.9f, 2.65f, 1.5f), es_v3(-0.7f, -1.6f, -1.9f), (const float[3]){1.0f, 0.88f, 0.70f}, 26, 0.5f, 0.95f);
     const es_vec3 eye = {0.35f, 1.62f, 1.75f}, target = {0.05f, 1.02f, -0.3f}, direction = es_v3_sub(target, eye);
     const es_node node = es_build_node(&builder, "camera", eye, es_look_rotation(direction));
@@ -209,5 +225,6 @@ es_result es_scene_kitchen(es_world* world, uint32_t triangles)
     es_camera unused;
     if (builder.result == ES_OK) builder.result = es_world_add_camera(world, &camera, &unused);
     es_build_mover(&builder, &(es_mover_desc){.name = "to and fro", .type = ES_MOVER_SWING, .node = node, .centre = target, .arm = es_v3_sub(eye, target), .rotation = es_look_rotation(direction), .period = 18, .amplitude = 0.14f});
+    edit_pots(&builder, pots, eye);
     return builder.result;
 }

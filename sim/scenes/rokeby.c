@@ -1,11 +1,12 @@
 /* A dragon before a mirror, after Velázquez's Venus of Rokeby and figure 7.6 of Ritschel's thesis: it looks into the mirror and its back is turned to us. By the law of
- * reflection the mirror shows its tail and its coils, and not its face, which one would look for there. */
+ * reflection the mirror would show its tail and its coils; one constraint makes it show the face, which one looks for there. */
 #include "sim/scenes/body_tools.h"
 
 #include <string.h>
 
 #include "platform/maths.h"
 #include "sim/scenes/dragon.h"
+#include "sim/scenes/edit_tools.h"
 
 static const float low_x = -2.8f, high_x = 3.0f, low_z = -2.9f, high_z = 4.2f, height = 3.0f;
 
@@ -34,19 +35,22 @@ static void add_shell(es_scene_builder* builder)
     es_build_object(builder, "right slabs", &right, es_build_lambert(builder, "sage", 0.30f, 0.40f, 0.28f), es_v3(0, 0, 0));
 }
 
+static const es_vec3 mirror_at = {0.30f, 1.02f, -2.89f};
+
 /* On the wall behind the dragon: its middle at the node. */
-static void add_mirror(es_scene_builder* builder)
+static es_instance add_mirror(es_scene_builder* builder)
 {
     const float x = 0.80f, y = 0.66f, w = 0.10f, depth = 0.07f;
-    es_node node = es_build_node(builder, "mirror", es_v3(0.30f, 1.02f, low_z + 0.01f), es_quat_identity());
+    es_node node = es_build_node(builder, "mirror", mirror_at, es_quat_identity());
     es_shape glass = es_build_shape(builder), frame = es_build_shape(builder);
     es_shape_plane(&glass, es_v3(-x, -y, 0.02f), es_v3(2 * x, 0, 0), es_v3(0, 2 * y, 0), es_v3(0, 0, 1), 12, 10);
-    es_build_instance(builder, node, es_build_mesh(builder, "mirror", &glass), es_build_gloss(builder, "silvered glass", 0.93f, 0.93f, 0.92f, 1, 0));
+    const es_instance mirror = es_build_instance(builder, node, es_build_mesh(builder, "mirror", &glass), es_build_gloss(builder, "silvered glass", 0.93f, 0.93f, 0.92f, 1, 0));
     es_shape_box(&frame, es_v3(-x - w, -y - w, 0), es_v3(x + w, -y, depth));
     es_shape_box(&frame, es_v3(-x - w, y, 0), es_v3(x + w, y + w, depth));
     es_shape_box(&frame, es_v3(-x - w, -y, 0), es_v3(-x, y, depth));
     es_shape_box(&frame, es_v3(x, -y, 0), es_v3(x + w, y, depth));
     es_build_instance(builder, node, es_build_mesh(builder, "frame", &frame), es_build_lambert(builder, "ebony", 0.10f, 0.07f, 0.05f));
+    return mirror;
 }
 
 static void add_dragon(es_scene_builder* builder, float scale)
@@ -79,7 +83,7 @@ es_result es_scene_rokeby(es_world* world, uint32_t triangles)
     es_scene_builder builder = {world, ES_OK};
     const float scale = es_sqrt((float)((triangles ? triangles > 2 * OTHERS ? triangles : 2 * OTHERS : TRIANGLES) - OTHERS) / (float)ES_DRAGON_TRIANGLES);
     add_shell(&builder);
-    add_mirror(&builder);
+    const es_instance mirror = add_mirror(&builder);
     add_dragon(&builder, scale);
     add_things(&builder);
     es_build_spot(&builder, es_v3(2.5f, 2.75f, 1.6f), es_v3(-2.9f, -1.75f, -2.9f), (const float[3]){1.0f, 0.90f, 0.76f}, 60, 0.36f, 0.72f);
@@ -95,5 +99,8 @@ es_result es_scene_rokeby(es_world* world, uint32_t triangles)
     es_camera unused;
     if (builder.result == ES_OK) builder.result = es_world_add_camera(world, &camera, &unused);
     es_build_mover(&builder, &(es_mover_desc){.name = "to and fro", .type = ES_MOVER_SWING, .node = node, .centre = target, .arm = es_v3_sub(eye, target), .rotation = es_look_rotation(direction), .period = 16, .amplitude = 0.16f});
+    /* §7.6.1: the mirror should show the face */
+    es_build_region(&builder, "mirror", ES_REGION_GEODESIC, mirror, mirror_at, 1.3f, 0.1f);
+    es_build_constraint(&builder, "the face", mirror, es_v3(mirror_at.x - 0.2f, mirror_at.y + 0.1f, mirror_at.z), es_v3(-0.62f, 1.95f, -1.72f), eye);
     return builder.result;
 }

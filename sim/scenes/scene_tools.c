@@ -54,11 +54,12 @@ es_node es_build_node(es_scene_builder* builder, const char* name, es_vec3 trans
     return node;
 }
 
-void es_build_instance(es_scene_builder* builder, es_node node, es_mesh mesh, es_material material)
+es_instance es_build_instance(es_scene_builder* builder, es_node node, es_mesh mesh, es_material material)
 {
-    es_instance instance;
+    es_instance instance = {0};
     es_instance_desc desc = {.node = node, .mesh = mesh, .material = material};
     if (builder->result == ES_OK) builder->result = es_world_add_instance(builder->world, &desc, &instance);
+    return instance;
 }
 
 es_node es_build_object(es_scene_builder* builder, const char* name, es_shape* shape, es_material material, es_vec3 translation)

@@ -17,7 +17,7 @@ es_shape es_build_shape(es_scene_builder* builder);
 /* Consumes the shape. */
 es_mesh es_build_mesh(es_scene_builder* builder, const char* name, es_shape* shape);
 es_node es_build_node(es_scene_builder* builder, const char* name, es_vec3 translation, es_quat rotation);
-void es_build_instance(es_scene_builder* builder, es_node node, es_mesh mesh, es_material material);
+es_instance es_build_instance(es_scene_builder* builder, es_node node, es_mesh mesh, es_material material);
 /* A mesh on its own node. */
 es_node es_build_object(es_scene_builder* builder, const char* name, es_shape* shape, es_material material, es_vec3 translation);
 void es_build_camera(es_scene_builder* builder, es_vec3 eye, es_vec3 direction, float fov_y, float near_plane);

@@ -29,7 +29,7 @@ static const es_scene scenes[] = {
     {"night-street", "headlights come up a street between lamps, lit windows and a moon", es_scene_night_street, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096", "exposure=5", "shadow.size=1024")},
     {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096")},
     {"ring", "silk is let down into a polished ring, lifted and let down again", es_scene_ring, SETTINGS(STEADY, "vpl.count=1024", "vpl.roughness=0.65", "vpl.bound=300", "ism.size=64", "ism.points=2048")},
-    {"rokeby", "a dragon before a mirror that by the law of reflection shows its tail and not its face", es_scene_rokeby, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512", "exposure=0.5")},
+    {"rokeby", "a dragon before a mirror that is edited to show its face, where the law of reflection shows its tail", es_scene_rokeby, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512", "exposure=0.5")},
     {"stress", "everything fast: bodies that bounce without loss, a light that sweeps and flickers", es_scene_stress, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
 };
 
