@@ -458,6 +458,7 @@ void player_return_to_view(player* p)
 static void step_history(player* p, bool back)
 {
     es_edit_history* h = p->edits.history;
+    if (h && back) committed(p, "moved"); /* what is still held */
     const char* label = !h ? NULL : back ? es_edit_history_undo_label(h) : es_edit_history_redo_label(h);
     p->edits.held = HANDLE_NONE;
     if (!label) {
@@ -485,7 +486,8 @@ static void edits_path(const player* p, char path[DEMO_PATH_SIZE])
 {
     char stem[64];
     play_stem(p->scene, stem);
-    snprintf(path, DEMO_PATH_SIZE, "%s-edits.gltf", stem);
+    if (p->options.edits) snprintf(path, DEMO_PATH_SIZE, "%s", p->options.edits);
+    else snprintf(path, DEMO_PATH_SIZE, "%s-edits.gltf", stem);
 }
 
 void player_save_edits(player* p)

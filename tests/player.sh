@@ -341,6 +341,44 @@ if play --replay stack.rec --size 320x240; then
     quit
 fi
 
+# ---- reflections: a handle is moved, that is undone and done again, saved, and rendered without a window to the same picture ------
+still=("${small[@]}" --set antialias=none --set temporal=false --set vpl.stable=false --set reflections.size=64)
+if play rokeby --size 320x240 "${still[@]}"; then
+    key space backslash
+    shot
+    first=$picture
+    key ctrl+e ctrl+h ctrl+h # the green handle of the scene's constraint
+    xdotool keydown Down
+    sleep 0.8; sleep $delay
+    xdotool keyup Down
+    key Escape
+    shot
+    moved=$picture
+    checks=$((checks + 1))
+    different "$first" "$moved" || fail 'a handle that is moved changes no reflection'
+    key ctrl+z
+    shot
+    checks=$((checks + 1))
+    alike "$first" "$picture" || fail 'Ctrl Z does not undo it'
+    key ctrl+y
+    shot
+    checks=$((checks + 1))
+    alike "$moved" "$picture" || fail 'Ctrl Y does not do it again'
+    key bracketright backslash # what is edited is no part of the time that is wound
+    shot
+    checks=$((checks + 1))
+    alike "$moved" "$picture" || fail 'winding back takes an edit away'
+    key ctrl+w
+    check 'the edits are not saved' test -s rokeby-edits.gltf
+    key F10
+    check 'no EXR screenshot' eval '[ -n "$(find pictures -name "rokeby*.exr")" ]'
+    "$program" render rokeby --size 320x240 "${still[@]}" --edits rokeby-edits.gltf --image radiance --out edited.exr >/dev/null 2>err
+    checks=$((checks + 1))
+    "$program" compare edited.exr pictures/rokeby*.exr --max-max 0 >/dev/null || fail 'without a window the saved edits make another picture'
+    key ctrl+n ctrl+g ctrl+k ctrl+f ctrl+v Escape
+    quit
+fi
+
 # ---- Wayland: a compositor in a window of the same screen, which gives the player all of it ------------------------------
 wayland()
 {
