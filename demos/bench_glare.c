@@ -9,7 +9,10 @@ static const bench_row table[] = {
     {"glare-spectrum-256", "aperture of 256² pixels at 2 × 2 places each, its spectrum in 32 wavelengths, no convolution (table 8.2)", "ms", NULL, BENCH_VALUE_AT_MOST, 9.0, 4.5},
     {"glare-spectrum-512", "the same, 512²", "ms", NULL, BENCH_VALUE_AT_MOST, 18.4, 9.2},
     {"glare-spectrum-1024", "the same, 1024²", "ms", NULL, BENCH_VALUE_AT_MOST, 55.1, 27.5},
-    {"glare-convolved-512", "the same, 512², and a picture of 512² convolved with it (fig. 8.10)", "ms", NULL, BENCH_VALUE_AT_MOST, 33, 16},
+    {"glare-aperture-256", "of these, drawing the aperture (table 8.2), 256²", "ms", NULL, BENCH_VALUE_AT_MOST, 5.2, 2.6},
+    {"glare-aperture-512", "the same, 512²", "ms", NULL, BENCH_VALUE_AT_MOST, 11.8, 5.9},
+    {"glare-aperture-1024", "the same, 1024²", "ms", NULL, BENCH_VALUE_AT_MOST, 36.5, 18.2},
+    {"glare-convolved-512", "aperture and spectrum, 512², and a picture of 512² convolved with it (fig. 8.10)", "ms", NULL, BENCH_VALUE_AT_MOST, 33, 16},
     {"glare-billboards-512", "the same with billboards (fig. 8.10: 19.1 ms with what else the frame is)", "ms", NULL, BENCH_NONE, 0, 0},
     {"glare-share", "lamp-shop, 1024×768, moving: glare's share of the frame, by convolution, its spectrum made each frame", "%", NULL, BENCH_VALUE_AT_MOST, 25, 8},
     {"glare-cycle-share", "the same with a cycle of 16 spectra, once they are made", "%", NULL, BENCH_NONE, 0, 0},
@@ -175,8 +178,8 @@ static es_renderer* open_renderer(bench_sitting* bench, const char* scene, uint3
     return renderer;
 }
 
-/* Frames of a moving world, the first of which, and `before` more, count for nothing: medians of glare's time and of its share. */
-static bool measure_frames(bench_sitting* bench, es_world* world, uint32_t w, uint32_t h, const char* const* settings, int before, double* milliseconds, double* share, char* note, size_t note_size)
+/* Frames of a moving world, the first of which, and `before` more, count for nothing: medians of glare's time, of its share, and of the aperture's time. */
+static bool measure_frames(bench_sitting* bench, es_world* world, uint32_t w, uint32_t h, const char* const* settings, int before, double* milliseconds, double* share, double* aperture, char* note, size_t note_size)
 {
     double times[MOST], shares[MOST], parts[3][MOST];
     es_renderer* renderer = open_renderer(bench, "lamp-shop", w, h, settings);
@@ -195,34 +198,37 @@ static bool measure_frames(bench_sitting* bench, es_world* world, uint32_t w, ui
     if (works) {
         *milliseconds = bench_median(times, bench->frames);
         *share = bench_median(shares, bench->frames);
+        *aperture = bench_median(parts[0], bench->frames);
         snprintf(note, note_size, "aperture %.3g, spectrum %.3g, picture %.3g ms", bench_median(parts[0], bench->frames), bench_median(parts[1], bench->frames), bench_median(parts[2], bench->frames));
     }
     es_renderer_destroy(renderer);
     return works;
 }
 
-typedef struct timed { const char* id; uint32_t width, height; int before; bool share; const char* settings[8]; } timed;
+typedef struct timed { const char *id, *aperture_id /* NULL: no row */; uint32_t width, height; int before; bool share; const char* settings[8]; } timed;
 static const timed times[] = {
     /* no billboards: nothing but the spectrum */
-    {"glare-spectrum-256", 512, 512, 0, false, {"glare=billboards", "glare.billboards=0", "glare.size=256", "glare.width=9", "skip=false", NULL}},
-    {"glare-spectrum-512", 512, 512, 0, false, {"glare=billboards", "glare.billboards=0", "glare.size=512", "glare.width=9", "skip=false", NULL}},
-    {"glare-spectrum-1024", 512, 512, 0, false, {"glare=billboards", "glare.billboards=0", "glare.size=1024", "glare.width=9", "skip=false", NULL}},
-    {"glare-convolved-512", 512, 512, 0, false, {"glare=convolution", "glare.size=512", "glare.width=9", "skip=false", NULL}},
-    {"glare-billboards-512", 512, 512, 0, false, {"glare=billboards", "glare.size=512", "glare.width=9", "skip=false", NULL}},
-    {"glare-share", 1024, 768, 0, true, {"glare=convolution", "glare.cycle=0", NULL}},
-    {"glare-cycle-share", 1024, 768, 60, true, {"glare=convolution", "glare.cycle=16", NULL}},
+    {"glare-spectrum-256", "glare-aperture-256", 512, 512, 0, false, {"glare=billboards", "glare.billboards=0", "glare.size=256", "glare.width=9", "glare.supersample=2", "skip=false", NULL}},
+    {"glare-spectrum-512", "glare-aperture-512", 512, 512, 0, false, {"glare=billboards", "glare.billboards=0", "glare.size=512", "glare.width=9", "glare.supersample=2", "skip=false", NULL}},
+    {"glare-spectrum-1024", "glare-aperture-1024", 512, 512, 0, false, {"glare=billboards", "glare.billboards=0", "glare.size=1024", "glare.width=9", "glare.supersample=2", "skip=false", NULL}},
+    {"glare-convolved-512", NULL, 512, 512, 0, false, {"glare=convolution", "glare.size=512", "glare.width=9", "glare.supersample=2", "skip=false", NULL}},
+    {"glare-billboards-512", NULL, 512, 512, 0, false, {"glare=billboards", "glare.size=512", "glare.width=9", "glare.supersample=2", "skip=false", NULL}},
+    {"glare-share", NULL, 1024, 768, 0, true, {"glare=convolution", "glare.cycle=0", NULL}},
+    {"glare-cycle-share", NULL, 1024, 768, 60, true, {"glare=convolution", "glare.cycle=16", NULL}},
 };
 
 static bool measure_times(bench_sitting* bench, es_world* world)
 {
     bool works = true;
     for (size_t i = 0; i < sizeof times / sizeof times[0] && works; i++) {
-        bench_row* row = sitting_row(bench, "%s", times[i].id);
-        if (!row) continue;
-        double milliseconds, share;
+        bench_row *row = sitting_row(bench, "%s", times[i].id), *aperture_row = times[i].aperture_id ? sitting_row(bench, "%s", times[i].aperture_id) : NULL;
+        if (!row && !aperture_row) continue;
+        double milliseconds, share, aperture;
         char note[160];
-        works = measure_frames(bench, world, bench->options->quick ? 64 : times[i].width, bench->options->quick ? 48 : times[i].height, times[i].settings, bench->options->quick ? 0 : times[i].before, &milliseconds, &share, note, sizeof note);
+        works = measure_frames(bench, world, bench->options->quick ? 64 : times[i].width, bench->options->quick ? 48 : times[i].height, times[i].settings, bench->options->quick ? 0 : times[i].before, &milliseconds, &share, &aperture, note, sizeof note);
         if (!works) break;
+        if (aperture_row) aperture_row->value = aperture;
+        if (!row) continue;
         row->value = times[i].share ? share : milliseconds;
         snprintf(row->note, sizeof row->note, "%s%s", note, times[i].share ? ", as the scene recommends" : "");
     }

@@ -11,6 +11,9 @@
 /* Nothing flickers: history, lights that stay on their surfaces, smooth edges. */
 #define STEADY "temporal=true", "vpl.stable=true", "antialias=temporal"
 
+/* As the eye sees what is bright. */
+#define SEEN "glare=convolution", "glare.supersample=4"
+
 static const es_scene scenes[] = {
     {"cornell", "a Cornell box with four moving objects under a moving spot light (3,372 triangles)", es_scene_cornell},
     {"room", "a closed room of 40 spheres and 20 tori under a spot light (69,552 triangles)", es_scene_room},
@@ -19,14 +22,14 @@ static const es_scene scenes[] = {
     {"courtyard", "a court with arcades under sun and sky; a day takes forty seconds (56,886 triangles)", es_scene_courtyard, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "exposure=-5.5", "shadow.size=1024")},
     {"bunny-box", "a rabbit floats in an open box under a spot light (72,128 triangles)", es_scene_bunny_box, SETTINGS(STEADY, "gi=second-order", "vpl.count=512", "ism.points=4096")},
     {"crease", "stairs, folds and toys on a floor, close to each other, under a spot light and a dim sky (72,676 triangles)", es_scene_crease, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "compensation.steps=1", "screen.repair=4")},
-    {"lamp-shop", "an animal walks about among lamps that all have a size (115,432 triangles)", es_scene_lamp_shop, SETTINGS(STEADY, "ism.points=4096")},
+    {"lamp-shop", "an animal walks about among lamps that all have a size (115,432 triangles)", es_scene_lamp_shop, SETTINGS(STEADY, "ism.points=4096", SEEN, "glare.field=8")},
     {"creature", "an animal walks past a curved light of many colours and kicks balls about", es_scene_creature, SETTINGS(STEADY, "vpl.count=512", "ism.points=2048", "vpl.light-size=64", "shadow.size=192", "shadow.filter=3", "exposure=0.9")},
     {"curtain", "a curtain in a doorway opens and closes the light of a room", es_scene_curtain, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "vpl.bound=40", "exposure=0.7")},
     {"gallery", "a museum's hall of glossy and diffuse things about a turning dragon (626,304 triangles)", es_scene_gallery, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "micro.points=1048576", "micro.spacing=4")},
     {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "filter.depth=0.1", "shadow.size=512", "vpl.light-size=128")},
     {"kitchen", "pots on a turning tray and pans that swing reflect a kitchen (300,000 triangles)", es_scene_kitchen, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "lamps.count=128", "lamps.vpls=128", "reflections=maps", "reflections.size=128")},
     {"maze", "a torch carried round a maze lights the chamber in its middle by three bounces (12,720 triangles)", es_scene_maze, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "bounces=3", "exposure=1.5", "filter.depth=0.1", "shadow.size=512", "vpl.light-size=128")},
-    {"night-street", "headlights come up a street between lamps, lit windows and a moon", es_scene_night_street, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096", "exposure=5", "shadow.size=1024")},
+    {"night-street", "headlights come up a street between lamps, lit windows and a moon", es_scene_night_street, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096", "exposure=5", "shadow.size=1024", SEEN)},
     {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096")},
     {"ring", "silk is let down into a polished ring, lifted and let down again", es_scene_ring, SETTINGS(STEADY, "vpl.count=1024", "vpl.roughness=0.65", "vpl.bound=300", "ism.size=64", "ism.points=2048")},
     {"rokeby", "a dragon before a mirror that is edited to show its face, where the law of reflection shows its tail", es_scene_rokeby, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512", "exposure=0.5")},
