@@ -45,7 +45,7 @@ typedef struct es_compose_job {
     const float* further[ES_FURTHER_LIGHTS][3]; /* reflected radiance, of either sign; NULL: none */
     /* what reflecting pixels see (gi/reflections/reflecting.h), added to the indirect light last; it takes the place of what lobes reflect of lamps and indirect light there */
     const uint32_t* mirrors;      /* not 0: the pixel reflects; NULL: none does */
-    const uint8_t* mirrors_any;   /* where that may be so, as `lit`; NULL: anywhere */
+    const uint8_t* mirrors_any;   /* where that may be so, or `mirrored` lit, as `lit`; NULL: anywhere */
     const float* mirrored[3];     /* reflected radiance; NULL: none */
     es_compose_layers layers;     /* composited with all but `reflected` */
     const float* finished[3];     /* the radiance itself, in place of all of the above; NULL: it is to be made */

@@ -42,6 +42,7 @@
     X(SCREEN_BOUNCE, "screen-space bounce", "samples")                                                           \
     X(RESIDUAL, "screen-space compensation", "samples")                                                          \
     X(REFLECTING, "reflected directions", "pixels")                                                              \
+    X(REFRACTING, "refracted directions", "pixels")                                                              \
     X(REFLECTION_MAPS, "reflection maps", "maps drawn")                                                          \
     X(REFLECTIONS, "reflections", "pixels")                                                                      \
     X(BLEND_LAYERS, "blended layers", "triangles")                                                               \

@@ -14,6 +14,7 @@
 #include "gi/micro_passes.h"
 #include "gi/passes.h"
 #include "gi/reflections/reflection_passes.h"
+#include "gi/reflections/refracting.h"
 #include "gi/screen/passes.h"
 #include "gi/screen/residual_pass.h"
 #include "gi/second_order_pass.h"
@@ -642,6 +643,7 @@ static es_result draw_picture(es_renderer* r, const es_frame_inputs* in, es_worl
     if (!result) result = es_pass_lamps(r, in);
     if (!result) result = pass_scene_points(r, in);
     if (!result) result = es_pass_hierarchy(r, in, world);
+    if (!result) result = es_pass_refracting(r, in, world);
     if (!result) result = es_pass_lamp_maps(r, in);
     if (!result) result = es_pass_lamp_bounce(r, in);
     if (!result) result = pass_maps(r, in);

@@ -5,6 +5,7 @@
 #include "gi/reference/scene.h"
 #include "platform/context.h"
 #include "raster/pack.h"
+#include "raster/solid_share.h"
 
 typedef struct corners { uint32_t vertex[3]; float weight[3]; } corners;
 
@@ -49,7 +50,7 @@ es_surfel_words es_surfel_read(const es_raster_mesh* mesh, const es_material_des
     float color[4] = {1, 1, 1, 1}, uvs[4] = {0, 0, 0, 0}, texel[4];
     if (mesh->colors) interpolate(mesh->colors, &c, color);
     if (mesh->uvs) interpolate(mesh->uvs, &c, uvs);
-    for (int k = 0; k < 4; k++) color[k] *= m->base_color[k];
+    for (int k = 0; k < 4; k++) color[k] *= k < 3 ? m->base_color[k] * es_solid_share(m) : m->base_color[k];
     if (m->base_color_texture.image) {
         es_trace_sample_texture(&m->base_color_texture, uvs, texel);
         for (int k = 0; k < 4; k++) color[k] *= texel[k];

@@ -1,10 +1,11 @@
 /* Materials as the kernels want them: clamped factors, resolved texture transforms, packed words that no texture changes. */
 #include "raster/pack.h"
 #include "raster/rasterizer.h"
+#include "raster/solid_share.h"
 
 es_material_desc es_default_material_desc(void)
 {
-    return (es_material_desc){.base_color = {1, 1, 1, 1}, .roughness = 1, .specular = 1, .exponent = 20, .normal_scale = 1, .alpha_cutoff = 0.5f};
+    return (es_material_desc){.base_color = {1, 1, 1, 1}, .roughness = 1, .specular = 1, .ior = 1.5f, .exponent = 20, .normal_scale = 1, .alpha_cutoff = 0.5f};
 }
 
 static float clamp_finite(float a, float low, float high) { return a > low ? (a < high ? a : high) : low; } /* NaN gives low */
@@ -28,6 +29,7 @@ static es_prepared_material prepare_material(const es_material_desc* desc)
 {
     es_prepared_material m = {0};
     for (int i = 0; i < 4; i++) m.base_color[i] = clamp_finite(desc->base_color[i], 0, 1);
+    for (int i = 0; i < 3; i++) m.base_color[i] *= es_solid_share(desc);
     m.metallic = clamp_finite(desc->metallic, 0, 1);
     m.roughness = clamp_finite(desc->roughness, 0, 1);
     m.specular = clamp_finite(desc->specular, 0, 1);

@@ -66,6 +66,11 @@ typedef struct es_material_desc {
     float metallic;           /* 0 … 1; default 0 */
     float roughness;          /* 0 … 1; default 1 */
     float specular;           /* METALLIC_ROUGHNESS: weight of the dielectric Fresnel term, 0 is Lambert; PHONG: lobe albedo; 0 … 1; default 1 */
+    /* METALLIC_ROUGHNESS: share of what the diffuse part does not reflect but lets through, in the base colour, 0 … 1; metals do not. The light goes through the thing as through glass of
+     * that index of refraction (KHR_materials_transmission, KHR_materials_ior). Only a renderer's camera sees so (es_renderer_settings.reflections), and the reference's; light that meets the
+     * surface on its way takes it as solid, with what is left of its diffuse part, and its interface reflects as that of index 1.5 does, by `specular`. */
+    float transmission;       /* default 0 */
+    float ior;                /* 1 … 5; 0: 1.5, the default */
     float exponent;           /* PHONG only, 1 … 50; default 20 */
     float emission[3];        /* radiance, W/(m² sr) */
     float normal_scale;       /* default 1 */

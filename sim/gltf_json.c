@@ -17,8 +17,8 @@
  * some 50 KiB of stack. */
 enum { MAX_DEPTH = 128 };
 
-const char* const es_gltf_extensions[] = {"EXT_lights_image_based", "KHR_animation_pointer", "KHR_implicit_shapes", "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular",
-    "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_physics_rigid_bodies", "KHR_texture_transform", NULL};
+const char* const es_gltf_extensions[] = {"EXT_lights_image_based", "KHR_animation_pointer", "KHR_implicit_shapes", "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
+    "KHR_materials_transmission", "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_physics_rigid_bodies", "KHR_texture_transform", NULL};
 
 typedef struct span { const char* begin; size_t size; } span;
 

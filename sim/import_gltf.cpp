@@ -208,7 +208,7 @@ struct geometry {
 /* What is warned of once per file, after it was read. */
 struct left_out {
     size_t lines_and_points = 0, partial_triangles = 0, sheared = 0;
-    size_t tinted_specular = 0, specular_textures = 0, sourceless_textures = 0, uv_sets = 0, dropped_channels = 0, dropped_pointers = 0, weightless = 0;
+    size_t tinted_specular = 0, specular_textures = 0, transmission_textures = 0, sourceless_textures = 0, uv_sets = 0, dropped_channels = 0, dropped_pointers = 0, weightless = 0;
     std::string sheared_name, pointer_name;
     bool light = false, camera = false; /* and was added */
 };
@@ -1045,6 +1045,13 @@ class importer
             from.emissiveTexture.index, from.emissiveTexture.texCoord, from.emissiveTexture.extensions, true, where + ".emissiveTexture");
         if (const tinygltf::Value* specular = extension(from.extensions, "KHR_materials_specular")) {
             fill_specular(*specular, where + ".extensions.KHR_materials_specular", desc);
+        }
+        if (const tinygltf::Value* ior = extension(from.extensions, "KHR_materials_ior")) {
+            desc.ior = es_clampf(extension_number(*ior, "ior", 1.5, 0.0, 1e6, where + ".extensions.KHR_materials_ior"), 1.0f, 5.0f);
+        }
+        if (const tinygltf::Value* transmission = extension(from.extensions, "KHR_materials_transmission")) {
+            desc.transmission = extension_number(*transmission, "transmissionFactor", 0.0, 0.0, 1.0, where + ".extensions.KHR_materials_transmission");
+            if (member(*transmission, "transmissionTexture")) { left.transmission_textures++; }
         }
     }
 
@@ -1925,6 +1932,7 @@ class importer
             warn("%zu animated properties are none of those that are animated here, they are left out (the first: %s)", left.dropped_pointers, left.pointer_name.c_str());
         }
         if (left.tinted_specular) { warn("%zu materials have a specular colour, of which only the luminance up to 1 is used", left.tinted_specular); }
+        if (left.transmission_textures) { warn("%zu transmission textures are left out: the factor alone counts", left.transmission_textures); }
         if (left.specular_textures) { warn("%zu specular colour textures are left out", left.specular_textures); }
         if (left.sourceless_textures) { warn("%zu textures have no PNG or JPEG image and are left out", left.sourceless_textures); }
         if (left.uv_sets) { warn("%zu textures use a third or later set of coordinates and are left out", left.uv_sets); }

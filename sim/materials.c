@@ -87,6 +87,8 @@ static es_result check(es_world* world, const char* name, const es_material_desc
                         : !es_within(desc->metallic, 0, 1)     ? "metallic must lie in 0 … 1"
                         : !es_within(desc->roughness, 0, 1)    ? "roughness must lie in 0 … 1"
                         : !es_within(desc->specular, 0, 1)     ? "specular must lie in 0 … 1"
+                        : !es_within(desc->transmission, 0, 1) ? "transmission must lie in 0 … 1"
+                        : desc->ior != 0 && !es_within(desc->ior, 1, 5) ? "its index of refraction must lie in 1 … 5, or be 0 for 1.5"
                         : desc->model == ES_SURFACE_PHONG && !es_within(desc->exponent, 1, 50) ? "the Phong exponent must lie in 1 … 50"
                         : !all_in(desc->emission, 3, 0, ES_WORLD_EXTENT)    ? "its emission must lie in 0 … 1e9"
                         : !es_within(desc->normal_scale, -1000, 1000)      ? "its normal scale must lie in -1000 … 1000"

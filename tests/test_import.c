@@ -535,6 +535,14 @@ static void materials(void** state)
     assert_true(texels[0] == 65535 && texels[1] == 0 && texels[5] == 65535 && texels[15] == 0);
     es_world_destroy(world);
 
+    /* glass; volume is not known: what is inside is clear, and the warning names it */
+    world = load(one_triangle("", ",'material':0", ",'extensionsUsed':['KHR_materials_transmission','KHR_materials_ior','KHR_materials_volume'],'materials':[{'extensions':{'KHR_materials_transmission':{'transmissionFactor':0.75},"
+        "'KHR_materials_ior':{'ior':1.33},'KHR_materials_volume':{'thicknessFactor':1}}}]"), triangle, 36);
+    m = material_at(world, 0);
+    near(m->transmission, 0.75f), near(m->ior, 1.33f);
+    assert_true(logged("KHR_materials_volume"));
+    es_world_destroy(world);
+
     world = load(one_triangle("", ",'material':0", ",'extensionsRequired':['KHR_materials_unlit'],'materials':[{'alphaMode':'BLEND','extensions':{'KHR_materials_unlit':{}}}]"), triangle, 36);
     m = material_at(world, 0);
     assert_int_equal(m->model, ES_SURFACE_UNLIT);

@@ -3,6 +3,7 @@
 
 #include "gi/reference/reference.h"
 #include "platform/random.h"
+#include "raster/solid_share.h"
 
 /* Goes up when the same world would give other samples. */
 enum { SAMPLES_VERSION = 2 };
@@ -22,7 +23,7 @@ static uint64_t texture_hash(uint64_t hash, const es_texture_use* use)
 static uint64_t material_hash(uint64_t hash, const es_material_desc* m)
 {
     const float numbers[] = {(float)m->model, m->base_color[0], m->base_color[1], m->base_color[2], m->base_color[3], m->metallic, m->roughness, m->specular, m->exponent,
-        m->emission[0], m->emission[1], m->emission[2], m->normal_scale, m->alpha_mask + 2.0f * m->blend, m->alpha_cutoff, m->double_sided};
+        m->emission[0], m->emission[1], m->emission[2], m->normal_scale, m->alpha_mask + 2.0f * m->blend, m->alpha_cutoff, m->double_sided, es_transmitted_share(m), es_ior_of(m)};
     hash = es_hash_bytes(hash, numbers, sizeof numbers);
     const es_texture_use* textures[] = {&m->base_color_texture, &m->metallic_roughness_texture, &m->normal_texture, &m->emission_texture, &m->specular_texture};
     for (size_t i = 0; i < sizeof textures / sizeof textures[0]; i++) hash = texture_hash(hash, textures[i]);

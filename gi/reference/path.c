@@ -137,7 +137,7 @@ es_ray es_path_ray(const es_pixel_rays* rays, float x, float y)
 
 void es_path_begin(const es_trace_scene* scene, const es_ray* ray, const es_hit* hit, bool quantised, es_path_start* start)
 {
-    *start = (es_path_start){.seen = hit->primitive != ES_NO_PRIMITIVE};
+    *start = (es_path_start){.seen = hit->primitive != ES_NO_PRIMITIVE, .weight = es_v3(1, 1, 1)};
     es_vec3 wo = es_v3_normalize(es_v3(-ray->direction[0], -ray->direction[1], -ray->direction[2]), es_v3(0, 0, 1));
     if (!start->seen) {
         start->emission = es_trace_environment(scene, es_v3_scale(wo, -1.0f));

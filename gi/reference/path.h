@@ -10,6 +10,7 @@ typedef struct es_path_start {
     bool seen;
     es_vec3 wo;                  /* unit, towards the eye, lifted to the horizon */
     es_vec3 emission;            /* seen directly, or the environment's radiance */
+    es_vec3 weight;              /* of what the sample finds: of a ray that went through glass, or was one of those that did not. Not applied by paths: to whoever adds them up */
     es_trace_surface surface;
 } es_path_start;
 

@@ -1,4 +1,5 @@
 /* The reference's life: settings, the film, adding samples, images of what has been summed. */
+#include "gi/reference/refraction.h"
 #include "gi/reference/reference.h"
 
 #include <string.h>
@@ -141,8 +142,8 @@ static es_result begin(es_reference* r, es_world* world)
     r->bounces = r->settings.bounces;
     r->sums = es_allocate_array(r->context, value_count(r) * es_reference_image_count(r), sizeof *r->sums);
     if (r->sums) r->squares = es_allocate_array(r->context, value_count(r) * es_reference_square_count(r), sizeof *r->squares);
-    /* what is seen through blended surfaces differs from sample to sample */
-    const bool same_hits = !r->settings.antialias && !r->scene.has_blended;
+    /* what is seen through blended surfaces and glass differs from sample to sample */
+    const bool same_hits = !r->settings.antialias && !r->scene.has_blended && !r->scene.has_glass;
     if (r->squares && same_hits) r->first_hits = es_allocate_array(r->context, (size_t)r->width * r->height, sizeof *r->first_hits);
     if (!r->squares || (!r->first_hits && same_hits)) return es_context_last_result(r->context);
     r->looked = false;
@@ -236,7 +237,36 @@ typedef struct tile_pixels {
 } tile_pixels;
 
 /* Pairs of numbers that no vertex of a path uses (gi/reference/path.c). */
-enum { PAIR_PIXEL = 0xffff, PAIR_LAYER = 0xfffd };
+enum { PAIR_PIXEL = 0xffff, PAIR_LAYER = 0xfffd, PAIR_GLASS = 0xfff0 /* and the one before, and so on: one for each thing of glass */, MOST_GLASS = 8 };
+
+/* A sample goes through glass or stays at its surface, by chance, as much as goes through; from thing to thing. */
+static uint32_t see_through(const es_reference* r, uint32_t seed, uint32_t sample, es_ray* ray, es_path_start* start)
+{
+    uint32_t rays = 0;
+    es_vec3 weight = es_v3(1, 1, 1);
+    for (uint32_t i = 0; i < MOST_GLASS && start->seen; i++) {
+        const es_trace_surface* s = &start->surface;
+        const float most = es_maxf(s->tint.x, es_maxf(s->tint.y, s->tint.z));
+        if (!(most > 0.0f)) break;
+        const es_refraction through = es_trace_refraction(&r->scene, s, es_v3_normalize(es_v3(ray->direction[0], ray->direction[1], ray->direction[2]), es_v3(0, 0, -1)));
+        rays += through.rays;
+        const float share = es_maxf(through.weight.x, es_maxf(through.weight.y, through.weight.z));
+        float u[2];
+        es_path_numbers(seed, PAIR_GLASS - i, sample, u);
+        if (!(u[0] < share)) {
+            weight = es_v3_scale(weight, 1.0f / (1.0f - share));
+            break;
+        }
+        weight = es_v3_scale(es_v3_mul(weight, through.weight), 1.0f / share);
+        *ray = (es_ray){{through.position.x, through.position.y, through.position.z}, 0.0f, {through.direction.x, through.direction.y, through.direction.z}, 3e38f};
+        es_hit hit;
+        rays++;
+        es_trace_closest(&r->scene, *ray, true, &hit);
+        es_path_begin(&r->scene, ray, &hit, r->settings.quantised, start);
+    }
+    start->weight = weight;
+    return rays;
+}
 
 static uint32_t begin_path(const es_reference* r, uint32_t pixel, uint32_t seed, uint32_t sample, es_path_start* start, es_vec3* direct)
 {
@@ -255,6 +285,7 @@ static uint32_t begin_path(const es_reference* r, uint32_t pixel, uint32_t seed,
     es_hit hit;
     es_trace_seen(&r->scene, ray, layer[0], &hit);
     es_path_begin(&r->scene, &ray, &hit, r->settings.quantised, start);
+    if (r->scene.has_glass) rays += see_through(r, seed, sample, &ray, start);
     *direct = es_path_direct(&r->scene, start, &rays);
     return rays + 1;
 }
@@ -282,7 +313,12 @@ static void sample_tiles(void* user, uint32_t begin_tile, uint32_t end_tile, uin
             for (uint32_t k = 0; k < group.count && (!i || !r->first_hits); k++)
                 rays += begin_path(r, tile.pixel[k], group.seeds[k], job->first + i, &tile.starts[k], &tile.direct[k]);
             rays += es_path_trace(&path, &group, job->first + i);
-            for (uint32_t k = 0; k < group.count; k++) add_sample(r, tile.pixel[k], tile.starts[k].emission, tile.direct[k], tile.bounce + k * (r->bounces + 1));
+            for (uint32_t k = 0; k < group.count; k++) {
+                es_vec3* bounce = tile.bounce + k * (r->bounces + 1);
+                const es_vec3 weight = tile.starts[k].weight;
+                for (uint32_t b = 0; b <= r->bounces && r->scene.has_glass; b++) bounce[b] = es_v3_mul(bounce[b], weight);
+                add_sample(r, tile.pixel[k], r->scene.has_glass ? es_v3_mul(tile.starts[k].emission, weight) : tile.starts[k].emission, r->scene.has_glass ? es_v3_mul(tile.direct[k], weight) : tile.direct[k], bounce);
+            }
         }
     }
     __atomic_fetch_add(&job->rays, rays, __ATOMIC_RELAXED);

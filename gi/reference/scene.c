@@ -6,6 +6,7 @@
 #include "gi/blend_lists.h"
 #include "platform/context.h"
 #include "raster/pack.h"
+#include "raster/solid_share.h"
 
 /* ---- textures -------------------------------------------------------------------------------------------------------------------- */
 
@@ -149,11 +150,15 @@ void es_trace_surface_at(const es_trace_scene* scene, const es_hit* hit, es_vec3
     float color[4] = {1, 1, 1, 1}, uvs[4] = {0, 0, 0, 0}, texel[4];
     if (mesh->colors) interpolate(mesh->colors, &c, color);
     if (mesh->uvs) interpolate(mesh->uvs, &c, uvs);
-    s->base = es_v3(color[0] * m->base_color[0], color[1] * m->base_color[1], color[2] * m->base_color[2]);
+    const float solid = es_solid_share(m), through = es_transmitted_share(m);
+    s->base = es_v3(color[0] * (m->base_color[0] * solid), color[1] * (m->base_color[1] * solid), color[2] * (m->base_color[2] * solid));
+    s->tint = through > 0.0f ? es_v3(color[0] * m->base_color[0], color[1] * m->base_color[1], color[2] * m->base_color[2]) : es_v3(0, 0, 0);
     if (m->base_color_texture.image) {
         es_trace_sample_texture(&m->base_color_texture, uvs, texel);
         s->base = es_v3_mul(s->base, es_v3(texel[0], texel[1], texel[2]));
+        s->tint = es_v3_mul(s->tint, es_v3(texel[0], texel[1], texel[2]));
     }
+    s->tint = es_v3_scale(es_v3(es_clampf(s->tint.x, 0, 1), es_clampf(s->tint.y, 0, 1), es_clampf(s->tint.z, 0, 1)), through);
     s->base = es_v3(es_clampf(s->base.x, 0, 1), es_clampf(s->base.y, 0, 1), es_clampf(s->base.z, 0, 1));
     float metallic = m->metallic, roughness = m->model == ES_SURFACE_PHONG ? m->exponent : m->roughness, specular = m->specular;
     if (m->metallic_roughness_texture.image) {
@@ -392,6 +397,7 @@ es_result es_trace_scene_take(es_trace_scene* scene, es_world* world, bool emiss
         if (es_mat4_determinant3(&m) < 0.0f)
             for (int k = 0; k < 9; k++) scene->normal_matrices[i][k] = -scene->normal_matrices[i][k];
         const es_material_desc* material = &scene->materials[scene->instances[i].material];
+        scene->has_glass |= es_transmitted_share(material) > 0.0f;
         scene->has_masks |= material->alpha_mask || material->blend;
         scene->has_blended |= material->blend;
     }

@@ -13,6 +13,7 @@ typedef struct es_trace_scene {
     float (*normal_matrices)[9];       /* per instance */
     es_light_state* lights;
     uint32_t instance_count, material_count, light_count;
+    bool has_glass;                    /* something lets light through; to all rays but the camera's it is solid */
     bool has_masks, has_blended;       /* blended surfaces are masks to all rays but the camera's */
     /* glowing triangles and the environment; `emitter_sums` runs up to 1 over the primitives by area × mean emission */
     uint32_t* emitters;
@@ -36,7 +37,8 @@ typedef struct es_trace_surface {
     es_vec3 position;
     es_vec3 geometric, normal;         /* unit, geometric on the side of wo */
     es_vec3 emission;                  /* towards wo, W/(m² sr) */
-    es_vec3 base;                      /* colour */
+    es_vec3 base;                      /* colour, of the diffuse part beside what goes through */
+    es_vec3 tint;                      /* of what goes through: colour × share; 0: nothing does (gi/reference/refraction.h) */
     es_surface surface;
     float metallic, roughness, specular; /* what that was made of; Phong: roughness is the exponent */
     uint32_t primitive;

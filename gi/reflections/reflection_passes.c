@@ -7,9 +7,11 @@
 #include "gi/lamp_passes.h"
 #include "gi/reflections/found_light.h"
 #include "gi/reflections/map_faces.h"
+#include "gi/reflections/refracting.h"
 #include "gi/reflections/traced.h"
 #include "platform/maths.h"
 #include "platform/random.h"
+#include "raster/solid_share.h"
 
 /* ---- memory ---------------------------------------------------------------------------------------------------------------------- */
 
@@ -32,6 +34,10 @@ void es_reflections_free_planes(es_context* context, es_reflections* f)
 {
     es_reflecting_buffers_free(context, &f->on_picture);
     es_planes_free(context, &f->light);
+    es_reflecting_buffers_free(context, &f->on_glass);
+    es_planes_free(context, &f->glass_position);
+    es_planes_free(context, &f->glass_edited);
+    es_planes_free(context, &f->glass_light);
     for (int i = 0; i < 2; i++) es_traced_level_free(context, &f->levels[i]);
 }
 
@@ -43,6 +49,7 @@ void es_reflections_free(es_context* context, es_reflections* f)
     es_release(context, f->map_of, f->map_of_capacity * sizeof *f->map_of);
     for (int k = 0; k < 3; k++) es_release(context, f->centre[k], f->centre_capacity[k] * sizeof(float));
     es_release(context, f->last_level, f->level_capacity * sizeof(float));
+    es_release(context, f->any, f->any_capacity);
     es_release(context, f->instances, f->instance_capacity * sizeof *f->instances);
     *f = (es_reflections){0};
 }
@@ -51,10 +58,11 @@ void es_reflections_free(es_context* context, es_reflections* f)
 
 typedef struct candidate { uint32_t place, id; float size; es_vec3 centre; float radius, alpha; } candidate;
 
-/* The widest lobe, as GGX's alpha, that any of the surface has and reflects with; below 0: none. Textures may make anything of it. */
+/* The widest lobe, as GGX's alpha, that any of the surface has and reflects with, or lets light through with; below 0: none. Textures may make anything of it. */
 static float widest_lobe(const es_material_desc* m, float roughness)
 {
     const float most = roughness * roughness;
+    if (es_transmitted_share(m) > 0.0f) return es_minf(m->roughness * m->roughness, 1.0f);
     if (m->model == ES_SURFACE_UNLIT || (!(m->specular > 0.0f) && !(m->metallic > 0.0f))) return -1.0f;
     if (m->model == ES_SURFACE_PHONG) {
         const float alpha = es_sqrt(2.0f / (m->exponent + 2.0f));
@@ -149,6 +157,7 @@ static es_result choose(es_renderer* r, const es_frame_inputs* in)
     const es_vec3 eye = eye_of(&r->rays);
     const bool traced = r->settings.reflections == ES_REFLECTIONS_TRACED;
     f->wants_rays = false;
+    f->has_glass = es_has_glass(in->list);
     for (uint32_t i = 0; i < in->list->instance_count; i++) {
         candidate c;
         if (is_candidate(r, in->list, i, eye, &c)) keep_largest(chosen, &count, r->settings.reflection_maps, &c);
@@ -303,11 +312,10 @@ es_result es_pass_reflection_maps(es_renderer* r, const es_frame_inputs* in)
     return ES_OK;
 }
 
-static es_result look_into_maps(es_renderer* r)
+static es_result look_into_maps(es_renderer* r, const es_reflection_atlas* atlas)
 {
     es_reflections* f = &r->reflections;
-    const es_reflection_atlas atlas = {f->texels, f->layout, {f->centre[0], f->centre[1], f->centre[2]}, f->last_level};
-    es_reflected_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .planes = f->on_picture.planes, .atlas = &atlas, .lit = f->light.lit};
+    es_reflected_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .planes = f->on_picture.planes, .atlas = atlas, .lit = f->light.lit};
     es_edited_reflections(r, job.edited);
     for (int k = 0; k < 3; k++) job.out[k] = f->light.at[k];
     es_reflected_from_maps(r->context, &job);
@@ -323,6 +331,16 @@ static es_result trace(es_renderer* r, const es_frame_inputs* in, uint64_t* rays
     return es_trace_reflections(r, in, &source, f->light.at, rays);
 }
 
+/* Where anything is seen, in mirrors or through glass. */
+static es_result join_any(es_renderer* r)
+{
+    es_reflections* f = &r->reflections;
+    const size_t chunks = f->on_picture.chunks;
+    if (!es_grow(r->context, (void**)&f->any, &f->any_capacity, 0, chunks, 1)) return es_context_last_result(r->context);
+    for (size_t i = 0; i < chunks; i++) f->any[i] = f->on_picture.planes.any[i] | (r->plan.valid[ES_PASS_REFRACTING] ? f->on_glass.planes.any[i] : 0);
+    return ES_OK;
+}
+
 es_result es_pass_reflections(es_renderer* r, const es_frame_inputs* in)
 {
     es_plan* plan = &r->plan;
@@ -334,6 +352,7 @@ es_result es_pass_reflections(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_REFLECTIONS);
     es_plan_reads_pass(plan, ES_PASS_REFLECTING);
     es_plan_reads_pass(plan, ES_PASS_REFLECTION_MAPS);
+    es_plan_reads_pass(plan, ES_PASS_REFRACTING);
     es_plan_reads_pass(plan, ES_PASS_EDITS);
     if (f->wants_rays) {
         const uint64_t words[] = {light_hash(r, in), plan->version[ES_PASS_HIERARCHY], r->settings.reflection_rays};
@@ -342,12 +361,15 @@ es_result es_pass_reflections(es_renderer* r, const es_frame_inputs* in)
     if (!es_plan_run(plan, ES_PASS_REFLECTIONS)) return ES_OK;
     uint64_t count = (uint64_t)r->gbuffer.width * r->gbuffer.height;
     es_result result = es_planes_resize(r->context, &f->light, &r->gbuffer);
-    if (!result) result = f->wants_rays ? trace(r, in, &count) : look_into_maps(r);
+    const es_reflection_atlas atlas = {f->texels, f->layout, {f->centre[0], f->centre[1], f->centre[2]}, f->last_level};
+    if (!result) result = f->wants_rays ? trace(r, in, &count) : look_into_maps(r, &atlas);
+    if (!result && plan->valid[ES_PASS_REFRACTING]) result = es_add_refractions(r, in, &atlas, &count);
+    if (!result) result = join_any(r);
     if (!result) es_plan_done(plan, ES_PASS_REFLECTIONS, count);
     return result;
 }
 
-bool es_reflections_want_rays(const es_renderer* r) { return r->plan.valid[ES_PASS_REFLECTING] && r->reflections.wants_rays; }
+bool es_reflections_want_rays(const es_renderer* r) { return r->plan.valid[ES_PASS_REFLECTING] && (r->reflections.wants_rays || r->reflections.has_glass); }
 
 void es_reflections_read(es_plan* plan) { es_plan_reads_pass(plan, ES_PASS_REFLECTIONS); }
 
@@ -357,5 +379,5 @@ void es_reflections_compose(const es_renderer* r, es_compose_job* job)
     const es_reflections* f = &r->reflections;
     for (int k = 0; k < 3; k++) job->mirrored[k] = f->light.at[k];
     job->mirrors = f->on_picture.planes.map;
-    job->mirrors_any = f->on_picture.planes.any;
+    job->mirrors_any = f->any;
 }

@@ -1,4 +1,5 @@
-/* The passes of reflections: which way reflecting pixels look, the maps, and what is seen in them.
+/* The passes of reflections: which way reflecting pixels look, the maps, and what is seen in them; and of what is seen through glass (gi/reflections/refracting.h), which
+ * has a map as reflecting things do.
  *
  * A thing reflects when its material has a lobe and is no rougher than es_renderer_settings.reflection_roughness. Of maps it has one, drawn from the middle of its
  * bounds without it, of what light meets (blended surfaces as masked), lit as the picture is: direct light with its shadow maps, lamps and indirect light by the frame's

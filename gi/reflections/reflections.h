@@ -77,6 +77,14 @@ typedef struct es_reflections {
 
     es_traced_level levels[2];
     bool wants_rays;            /* in this frame */
+    bool has_glass;             /* likewise */
+
+    /* where light leaves glass: its planes' directions are the original ones, (0, 0, 0) elsewhere, and albedo is what arrives of it */
+    es_reflecting_buffers on_glass;
+    es_planes glass_position, glass_edited, glass_light;
+    bool glass_is_edited;
+    uint8_t* any;               /* es_reflecting_planes.any of either */
+    size_t any_capacity;
 
     es_reflecting_buffers on_face, on_picture;
     es_planes light;            /* reflected radiance */

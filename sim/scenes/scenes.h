@@ -29,6 +29,8 @@ es_result es_scene_lamp_shop(es_world* world, uint32_t triangles);
 es_result es_scene_bunny_box(es_world* world, uint32_t triangles);
 es_result es_scene_night_street(es_world* world, uint32_t triangles);
 es_result es_scene_rokeby(es_world* world, uint32_t triangles);
+es_result es_scene_lens(es_world* world, uint32_t triangles);
+es_result es_scene_ring_face(es_world* world, uint32_t triangles);
 es_result es_scene_kitchen(es_world* world, uint32_t triangles);
 es_result es_scene_gallery(es_world* world, uint32_t triangles);
 
