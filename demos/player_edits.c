@@ -132,7 +132,7 @@ static bool is_transmissive(const player* p, es_instance instance)
 {
     es_instance_desc desc;
     es_material_desc material;
-    return es_world_get_instance(p->session.world, instance, &desc) == ES_OK && es_world_get_material(p->session.world, desc.material, &material) == ES_OK && false;
+    return es_world_get_instance(p->session.world, instance, &desc) == ES_OK && es_world_get_material(p->session.world, desc.material, &material) == ES_OK && material.transmission > 0.5f;
 }
 
 /* What is seen there now is what it begins with. */

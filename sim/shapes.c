@@ -223,3 +223,36 @@ void es_shape_cylinder(es_shape* shape, es_vec3 base, float radius, float height
     const es_vec2 profile[] = {{0, 0}, {radius, 0}, {radius, height}, {0, height}};
     es_shape_lathe(shape, base, profile, 4, n);
 }
+
+void es_shape_smooth_lathe(es_shape* shape, es_vec3 base, const es_vec2* profile, uint32_t count, uint32_t between, uint32_t n)
+{
+    enum { MOST = 256 };
+    es_vec2 fine[MOST];
+    uint32_t points = 0;
+    for (uint32_t i = 0; i + 1 < count; i++) {
+        const es_vec2 a = profile[i ? i - 1 : 0], b = profile[i], c = profile[i + 1], e = profile[i + 2 < count ? i + 2 : count - 1];
+        for (uint32_t k = 0; k < between && points + 1 < MOST; k++) {
+            /* Catmull and Rom's spline */
+            const float t = (float)k / (float)between, t2 = t * t, t3 = t2 * t;
+            const float wa = 0.5f * (-t3 + 2 * t2 - t), wb = 0.5f * (3 * t3 - 5 * t2 + 2), wc = 0.5f * (-3 * t3 + 4 * t2 + t), we = 0.5f * (t3 - t2);
+            fine[points].x = es_maxf(wa * a.x + wb * b.x + wc * c.x + we * e.x, 0.0f);
+            fine[points++].y = wa * a.y + wb * b.y + wc * c.y + we * e.y;
+        }
+    }
+    fine[points++] = profile[count - 1];
+    for (uint32_t i = 0; i < points; i++)
+        for (uint32_t k = 0; k <= n; k++) {
+            const es_vec2 p = fine[i], low = fine[i ? i - 1 : 0], high = fine[i + 1 < points ? i + 1 : i];
+            const float angle = 2.0f * ES_PI * (float)(k % n) / (float)n, dx = high.x - low.x, dy = high.y - low.y, length = es_maxf(es_sqrt(dx * dx + dy * dy), 1e-9f);
+            float sine, cosine;
+            es_sincos(angle, &sine, &cosine);
+            es_shape_vertex(shape, es_v3(base.x + p.x * cosine, base.y + p.y, base.z + p.x * sine), es_v3(dy / length * cosine, -dx / length, dy / length * sine));
+        }
+    const uint32_t first = (uint32_t)(shape->vertex_count - (size_t)points * (n + 1));
+    for (uint32_t i = 0; i + 1 < points; i++)
+        for (uint32_t k = 0; k < n; k++) {
+            const uint32_t a = first + i * (n + 1) + k, b = a + n + 1;
+            es_shape_triangle(shape, a, b, b + 1);
+            es_shape_triangle(shape, a, b + 1, a + 1);
+        }
+}

@@ -51,5 +51,7 @@ void es_shape_torus_knot(es_shape* shape, es_vec3 centre, uint32_t p, uint32_t q
 /* A profile of (radius, height) turned about the y axis through `base`; each profile segment has its own flat-sided normals.
  * Going up the profile, outside is to the right. */
 void es_shape_lathe(es_shape* shape, es_vec3 base, const es_vec2* profile, uint32_t count, uint32_t n);
+/* The same with the profile's corners rounded by a spline of `between` steps from point to point (256 points in all at the most), and normals as smooth. */
+void es_shape_smooth_lathe(es_shape* shape, es_vec3 base, const es_vec2* profile, uint32_t count, uint32_t between, uint32_t n);
 
 #endif

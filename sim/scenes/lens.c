@@ -1,5 +1,6 @@
 /* A burning glass and a crystal ball on a table before a picture: both show it turned over. */
 #include "sim/scenes/body_tools.h"
+#include "sim/scenes/edit_tools.h"
 
 #include <string.h>
 
@@ -105,7 +106,9 @@ es_result es_scene_lens(es_world* world, uint32_t triangles)
     memcpy(glass.base_color, (const float[3]){0.97f, 0.985f, 0.98f}, 3 * sizeof(float));
     const es_material crystal = es_build_material(&builder, "crystal", &glass), brass = es_build_lambert(&builder, "brass", 0.50f, 0.38f, 0.16f);
     es_shape_sphere(&ball, es_v3(0, 0, 0), 0.21f, 2 * n, n);
-    es_build_object(&builder, "crystal ball", &ball, crystal, es_v3(-0.36f, 1.0f, 0.05f));
+    const es_vec3 ball_at = {-0.36f, 1.0f, 0.05f}, eye = {0.1f, 1.25f, 1.75f};
+    const es_node ball_node = es_build_node(&builder, "crystal ball", ball_at, es_quat_identity());
+    const es_instance crystal_ball = es_build_instance(&builder, ball_node, es_build_mesh(&builder, "crystal ball", &ball), crystal);
     es_shape_torus(&stand, es_v3(-0.36f, 0.775f, 0.05f), 0.11f, 0.025f, 0, n, n / 4 + 3);
     /* the burning glass turns about its foot */
     es_shape_cylinder(&stand, es_v3(0.42f, 0.75f, 0.05f), 0.1f, 0.02f, n);
@@ -120,6 +123,10 @@ es_result es_scene_lens(es_world* world, uint32_t triangles)
     es_shape_torus(&rim, es_v3(0, 0, 0), 0.238f, 0.012f, 0, n, 12);
     es_build_instance(&builder, upright, es_build_mesh(&builder, "rim", &rim), brass);
     es_build_spot(&builder, es_v3(1.2f, 2.5f, 1.4f), es_v3(-0.9f, -1.2f, -2.2f), (const float[3]){1.0f, 0.94f, 0.84f}, 26, 0.5f, 0.9f);
-    es_build_camera(&builder, es_v3(0.1f, 1.25f, 1.75f), es_v3(-0.03f, -0.09f, -1), 0.75f, 0.05f);
+    es_build_camera(&builder, eye, es_v3(-0.03f, -0.09f, -1), 0.75f, 0.05f);
+    /* §7.6.1: the ball shows the sun of the picture in its middle */
+    const es_vec3 front = es_v3_add(ball_at, es_v3_scale(es_v3_normalize(es_v3_sub(eye, ball_at), es_v3(0, 0, 1)), 0.21f)), sun = {0.46f, 1.68f, -1.44f};
+    es_build_region(&builder, "crystal ball", ES_REGION_GEODESIC, crystal_ball, front, 0.30f, 0.10f);
+    es_build_refraction(&builder, "the sun", crystal_ball, front, es_v3_sub(sun, ball_at), eye);
     return builder.result;
 }

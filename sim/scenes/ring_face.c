@@ -1,5 +1,6 @@
 /* A head beside a ring of brushed metal that stands on edge before it and turns: what the ring shows of the face is small and at its rim, after figure 7.8 of Ritschel's thesis. */
 #include "sim/scenes/body_tools.h"
+#include "sim/scenes/edit_tools.h"
 
 #include <string.h>
 
@@ -67,15 +68,20 @@ es_result es_scene_ring_face(es_world* world, uint32_t triangles)
     /* the head stands behind and to the left, turned to the ring */
     add_head(&builder, es_build_node(&builder, "head", es_v3(-0.30f, 0.80f, 0.10f), es_quat_from_axis_angle(es_v3(0, 1, 0), 1.15f)), n);
     /* a wide band: outside slightly barrelled, inside hollow */
-    static const es_vec2 band[] = {{0.150f, -0.075f}, {0.163f, -0.075f}, {0.172f, -0.045f}, {0.1745f, 0}, {0.172f, 0.045f}, {0.163f, 0.075f}, {0.150f, 0.075f}, {0.150f, -0.075f}};
+    static const es_vec2 band[] = {{0.148f, 0}, {0.150f, -0.060f}, {0.153f, -0.074f}, {0.161f, -0.076f}, {0.167f, -0.064f}, {0.1725f, -0.030f}, {0.1740f, 0}, {0.1725f, 0.030f}, {0.167f, 0.064f}, {0.161f, 0.076f}, {0.153f, 0.074f}, {0.150f, 0.060f}, {0.148f, 0}};
     es_shape ring = es_build_shape(&builder);
-    es_shape_lathe(&ring, es_v3(0, 0, 0), band, sizeof band / sizeof band[0], 4 * n);
+    es_shape_smooth_lathe(&ring, es_v3(0, 0, 0), band, sizeof band / sizeof band[0], 8, 4 * n);
     es_node at = es_build_node(&builder, "ring", es_v3(0.20f, 0.68f, 0.08f), es_quat_identity());
     es_build_mover(&builder, &(es_mover_desc){.name = "turn", .type = ES_MOVER_SWING, .node = at, .centre = es_v3(0.20f, 0.68f, 0.08f), .period = 14, .amplitude = 0.25f});
     es_node upright = es_build_child(&builder, "ring", at, es_v3(0, 0, 0), es_quat_mul(es_quat_from_axis_angle(es_v3(0, 1, 0), 1.0f), es_quat_from_axis_angle(es_v3(1, 0, 0), 0.5f * ES_PI)));
-    es_build_instance(&builder, upright, es_build_mesh(&builder, "ring", &ring), es_build_gloss(&builder, "gold", 1.0f, 0.78f, 0.42f, 1, 0.18f));
+    const es_instance gold = es_build_instance(&builder, upright, es_build_mesh(&builder, "ring", &ring), es_build_gloss(&builder, "gold", 1.0f, 0.78f, 0.42f, 1, 0.12f));
     es_build_spot(&builder, es_v3(0.7f, 1.85f, 1.2f), es_v3(-0.75f, -1.05f, -1.1f), (const float[3]){1.0f, 0.93f, 0.82f}, 12, 0.45f, 0.9f);
     es_build_spot(&builder, es_v3(1.2f, 1.2f, -0.6f), es_v3(-1.4f, -0.4f, 0.7f), (const float[3]){0.75f, 0.85f, 1.0f}, 4, 0.5f, 0.9f);
-    es_build_camera(&builder, es_v3(0.28f, 0.92f, 1.05f), es_v3(-0.24f, -0.16f, -1), 0.72f, 0.03f);
+    const es_vec3 eye = {0.28f, 0.92f, 1.05f};
+    es_build_camera(&builder, eye, es_v3(-0.24f, -0.16f, -1), 0.72f, 0.03f);
+    /* §7.6.1: two constraints make the face more visible in the ring */
+    es_build_region(&builder, "ring", ES_REGION_GEODESIC, gold, es_v3(0.10f, 0.70f, 0.23f), 0.20f, 0.08f);
+    es_build_constraint(&builder, "the eyes", gold, es_v3(0.09f, 0.735f, 0.235f), es_v3(-0.20f, 0.83f, 0.15f), eye);
+    es_build_constraint(&builder, "the chin", gold, es_v3(0.09f, 0.655f, 0.235f), es_v3(-0.20f, 0.70f, 0.15f), eye);
     return builder.result;
 }
