@@ -27,14 +27,14 @@ static const es_scene scenes[] = {
     {"curtain", "a curtain in a doorway opens and closes the light of a room", es_scene_curtain, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "vpl.bound=40", "exposure=0.7")},
     {"gallery", "a museum's hall of glossy and diffuse things about a turning dragon (626,304 triangles)", es_scene_gallery, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "micro.points=1048576", "micro.spacing=4")},
     {"lantern-walk", "a swinging lantern is carried through the dark hall", es_scene_lantern_walk, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "filter.depth=0.1", "shadow.size=512", "vpl.light-size=128")},
-    {"kitchen", "pots on a turning tray and pans that swing reflect a kitchen (300,000 triangles)", es_scene_kitchen, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "lamps.count=128", "lamps.vpls=128", "reflections=maps", "reflections.size=128")},
-    {"lens", "a crystal ball and a burning glass before a picture, which they turn over", es_scene_lens, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512")},
+    {"kitchen", "pots on a turning tray and pans that swing reflect a kitchen (300,000 triangles)", es_scene_kitchen, SETTINGS(STEADY, "half-resolution=true", "shadow.size=1024", "vpl.count=256", "ism.points=2048", "lamps.count=128", "lamps.vpls=128", "reflections=maps", "reflections.size=128")},
+    {"lens", "a crystal ball and a burning glass before a picture, which they turn over", es_scene_lens, SETTINGS(STEADY, "shadow.size=1024", "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512")},
     {"maze", "a torch carried round a maze lights the chamber in its middle by three bounces (12,720 triangles)", es_scene_maze, SETTINGS(STEADY, "vpl.count=512", "ism.points=4096", "bounces=3", "exposure=1.5", "filter.depth=0.1", "shadow.size=512", "vpl.light-size=128")},
     {"night-street", "headlights come up a street between lamps, lit windows and a moon", es_scene_night_street, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096", "exposure=5", "shadow.size=1024", SEEN)},
     {"rain-of-things", "six hundred things rain into a yard and pile up under two turning beams", es_scene_rain_of_things, SETTINGS(STEADY, "vpl.count=256", "ism.points=4096")},
     {"ring", "silk is let down into a polished ring, lifted and let down again", es_scene_ring, SETTINGS(STEADY, "vpl.count=1024", "vpl.roughness=0.65", "vpl.bound=300", "ism.size=64", "ism.points=2048")},
-    {"ring-face", "a ring of brushed gold turns beside a head and shows it at its rim", es_scene_ring_face, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "reflections=maps")},
-    {"rokeby", "a dragon before a mirror that is edited to show its face, where the law of reflection shows its tail", es_scene_rokeby, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512", "exposure=0.5")},
+    {"ring-face", "a ring of brushed gold turns beside a head and shows it at its rim", es_scene_ring_face, SETTINGS(STEADY, "shadow.size=1024", "vpl.count=256", "ism.points=2048", "reflections=maps")},
+    {"rokeby", "a dragon before a mirror that is edited to show its face, where the law of reflection shows its tail", es_scene_rokeby, SETTINGS(STEADY, "half-resolution=true", "shadow.size=1024", "vpl.count=256", "ism.points=2048", "reflections=maps", "reflections.size=512", "exposure=0.5")},
     {"stress", "everything fast: bodies that bounce without loss, a light that sweeps and flickers", es_scene_stress, SETTINGS(STEADY, "vpl.count=256", "ism.points=2048")},
 };
 
