@@ -498,6 +498,28 @@ void player_save_edits(player* p)
     player_notice(p, "saved: earthshine render SCENE --edits %s", path);
 }
 
+static bool is_file(const player* p)
+{
+    for (size_t i = 0; i < es_scene_count(); i++)
+        if (!strcmp(p->scene, es_scene_name(i))) return false;
+    return true;
+}
+
+/* A copy of the scene's file with the edits in it, beside it: what it refers to is still found. */
+void player_save_edited_scene(player* p)
+{
+    char path[DEMO_PATH_SIZE];
+    const char *slash = strrchr(p->scene, '/'), *dot = strrchr(p->scene, '.');
+    if (!is_file(p)) {
+        player_notice(p, "%s is built in: its edits are saved alone (Ctrl W)", p->scene);
+        return;
+    }
+    if (!dot || (slash && dot < slash)) dot = p->scene + strlen(p->scene);
+    snprintf(path, sizeof path, "%.*s-edited%s", (int)(dot - p->scene), p->scene, dot);
+    if (es_world_save_edits(p->session.world, p->scene, path) != ES_OK) return complain(p);
+    player_notice(p, "saved: %s", path);
+}
+
 void player_load_edits(player* p)
 {
     char path[DEMO_PATH_SIZE];
@@ -666,5 +688,6 @@ void player_edits_panel(player* p, canvas_rect rect)
     ui_next_row(u);
     if (ui_button(u, "save", 6, "Save")) player_save_edits(p);
     if (ui_button(u, "load", 6, "Load")) player_load_edits(p);
+    if (is_file(p) && ui_button(u, "scene", 22, "Save a copy of the scene")) player_save_edited_scene(p);
     ui_panel_end(u);
 }

@@ -45,6 +45,7 @@ void player_keep_edits(player* p, bool after);
 void player_undo_edit(player* p);
 void player_redo_edit(player* p);
 void player_save_edits(player* p);
+void player_save_edited_scene(player* p);
 void player_load_edits(player* p);
 
 #endif
