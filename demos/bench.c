@@ -45,6 +45,7 @@ static const benchmark benchmarks[] = {
     {"compensation", bench_compensation, bench_compensation_rows, false},
     {"second-order", bench_second_order, bench_second_order_rows, false},
     {"edits", bench_edits, bench_edits_rows, false},
+    {"reflections", bench_reflections, bench_reflections_rows, false},
     {"combinations", bench_combinations, bench_combinations_rows, false},
     {"glare", bench_glare, bench_glare_rows, false},
     {"scale", bench_scale, bench_scale_rows, false},

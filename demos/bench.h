@@ -176,6 +176,9 @@ size_t bench_compensation_rows(bench_row* rows, size_t capacity);
 /* bench_edits.c */
 int bench_edits(const bench_options* options);
 size_t bench_edits_rows(bench_row* rows, size_t capacity);
+/* bench_reflections.c */
+int bench_reflections(const bench_options* options);
+size_t bench_reflections_rows(bench_row* rows, size_t capacity);
 /* bench_second_order.c */
 int bench_second_order(const bench_options* options);
 size_t bench_second_order_rows(bench_row* rows, size_t capacity);

@@ -429,6 +429,8 @@ says '^lamps-curved-512 +[0-9.]+ ms '
 expect 0 bench compensation --quick --threads 2 --only compensation-step-cornell --only compensation-samples --only compensation-energy-layers-crease-3 --out figures
 says '^compensation-samples +[0-9.]+ patches +[0-9.]+ '
 says '^compensation-energy-layers-crease-3 +[0-9.]+ % '
+expect 0 bench reflections --quick --threads 2 --only reflections-error-lens-maps
+says '^reflections-error-lens-maps +[0-9.]+ % '
 expect 0 bench second-order --quick --threads 2 --out figures
 says '^second-order-low-share +[0-9.]+ % '
 expect 0 bench combinations --quick --size 48x32 --spp 2 --threads 2 --only combinations-crease
