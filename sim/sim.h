@@ -857,7 +857,7 @@ ES_API bool es_world_frozen_reflections(const es_world* world, double eye[3]); /
  * numbers; INFINITY beyond max_distance and where no way leads: meshes may consist of parts. Vertices at one place are one, so that seams are none. */
 typedef enum es_geodesic_method {
     ES_GEODESIC_FRONT,        /* over the triangles: a wave front from a point source through unfolded triangles, until nothing becomes shorter. Exact on planes and what unrolls;
-                               * on a sphere off by 1 % of the mean distance with 768 triangles and 0.03 % with 500,000 (`earthshine bench geodesic`) */
+                        * on a sphere off by 1 % of the mean distance with 768 triangles and 0.03 % with 500,000 (`earthshine bench geodesic`) */
     ES_GEODESIC_EDGES         /* along edges (Dijkstra), from the source's nearest vertex: the thesis' (§7.5.2). Too long by 5 to 6 % in the mean however fine the mesh, across the
                                * diagonals of squares by 41 % */
 } es_geodesic_method;

@@ -149,6 +149,26 @@ static void test_reflected_point(void** state)
         }
 }
 
+/* What lies behind the mirror is shown as well: it is not in its own way. */
+static void test_behind(void** state)
+{
+    (void)state;
+    static const char* const ways[] = {"maps", "traced"};
+    for (int way = 0; way < 2; way++) {
+        const es_vec3 ball = es_v3(0.3f, 1.3f, -1.5f);
+        small_world w = mirror_world(NULL, ball);
+        const es_anchor red = on_mirror(&w, 0.35f, 0.4f);
+        const es_vec3 at = constrain(&w, red, ball);
+        surround(&w, red, 3, 1);
+        es_image image = reflections(&w, ways[way]);
+        double x, y;
+        pixel_of(&w, at, &x, &y);
+        assert_true(nearest(&image, x, y) < 1.0);
+        es_image_destroy(w.context, &image);
+        small_world_destroy(&w);
+    }
+}
+
 /* The law first: the mirror image of the ball is where it is by construction. */
 static void test_without_edits(void** state)
 {
@@ -219,6 +239,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_without_edits),
         cmocka_unit_test(test_reflected_point),
+        cmocka_unit_test(test_behind),
         cmocka_unit_test(test_outside),
         cmocka_unit_test(test_same_everywhere),
     };

@@ -86,15 +86,22 @@ static es_vec3 turned(es_vec3 v, es_vec3 from, es_vec3 to)
     return es_v3_add(es_v3_add(es_v3_scale(v, c), across), es_v3_scale(axis, es_v3_dot(axis, v) / (1.0f + c)));
 }
 
+static es_vec3 edited_at(const es_traced_source* s, size_t at) { return s->edited[0] ? load3(s->edited, at) : es_v3(0, 0, 0); }
+static bool is_edited(const es_traced_source* s, size_t at)
+{
+    const es_vec3 e = edited_at(s, at);
+    return es_v3_dot(e, e) > 0.0f;
+}
+
 /* The direction of a pixel's ray, unit, and its weight; false: none this time. */
 static bool direction_of(const ray_loop* loop, size_t at, uint32_t x, uint32_t y, es_vec3 geometric, es_vec3* direction, es_vec3* weight)
 {
     const es_traced_source* s = loop->source;
     const es_gbuffer* g = s->gbuffer;
     const es_vec3 mirrored = load3((const float* const*)s->planes->direction, at);
-    const es_vec3 edited = s->edited[0] ? load3(s->edited, at) : es_v3(0, 0, 0);
-    const bool is_edited = es_v3_dot(edited, edited) > 0.0f, wide = s->planes->alpha[at] > MIRROR_ALPHA;
-    *direction = is_edited ? edited : mirrored;
+    const es_vec3 edited = edited_at(s, at);
+    const bool turns = is_edited(s, at), wide = s->planes->alpha[at] > MIRROR_ALPHA;
+    *direction = turns ? edited : mirrored;
     *weight = es_v3(1, 1, 1);
     if (!wide || s->rays_per_pixel == 1) return loop->sample == 0;
     es_surface surface = es_surface_of_gbuffer(g->albedo_rg[at], g->albedo_b[at], g->surface[at]);
@@ -107,8 +114,8 @@ static bool direction_of(const ray_loop* loop, size_t at, uint32_t x, uint32_t y
     const float k = (float)loop->sample, u = es_unit_float(pixel) + k * 0.754877666f, v = es_unit_float(es_hash_u32(pixel)) + k * 0.569840291f, three[3] = {0.5f, u - es_floor(u), v - es_floor(v)};
     es_surface_sample chosen;
     if (!es_surface_sample_direction(&surface, n, wo, three, &chosen)) return false;
-    if (!is_edited && !(es_v3_dot(geometric, chosen.wi) > 0.0f)) return false;
-    *direction = is_edited ? es_v3_normalize(turned(chosen.wi, mirrored, edited), edited) : chosen.wi;
+    if (!turns && !(es_v3_dot(geometric, chosen.wi) > 0.0f)) return false;
+    *direction = turns ? es_v3_normalize(turned(chosen.wi, mirrored, edited), edited) : chosen.wi;
     *weight = chosen.weight;
     return true;
 }
@@ -133,7 +140,24 @@ static void put_hit(const ray_loop* loop, size_t at, const es_ray* ray, const es
     store3(loop->level->found.at, at, s.position);
 }
 
-static void trace_run(const ray_loop* loop, const es_ray* rays, const size_t* places, uint32_t count)
+enum { MOST_PASSED = 64 };
+
+static uint32_t instance_of(const es_trace_scene* scene, const es_hit* hit)
+{
+    return hit->primitive == ES_NO_PRIMITIVE ? 0 : scene->instances[es_bvh_primitives(scene->bvh)[hit->primitive].instance].id + 1;
+}
+
+/* An artist may ask for what lies behind the surface (Ritschel thesis §7.5.3): the thing itself, `own` by its word of the G-buffer, is not in the way, as it is in no map of its own. */
+static void pass_own(const es_trace_scene* scene, es_ray ray, uint32_t own, es_hit* hit)
+{
+    for (int i = 0; i < MOST_PASSED && instance_of(scene, hit) == own; i++) {
+        ray.min = hit->t * 1.00001f + 1e-6f;
+        if (scene->has_masks) es_trace_closest(scene, ray, false, hit);
+        else es_bvh_closest(scene->bvh, ES_RAYS_SINGLE, &ray, 1, hit);
+    }
+}
+
+static void trace_run(const ray_loop* loop, const es_ray* rays, const size_t* places, const uint32_t* own, uint32_t count)
 {
     es_hit hits[RUN];
     if (loop->scene->has_masks)
@@ -141,6 +165,7 @@ static void trace_run(const ray_loop* loop, const es_ray* rays, const size_t* pl
     else
         es_bvh_closest(loop->scene->bvh, ES_RAYS_COHERENT, rays, count, hits);
     for (uint32_t i = 0; i < count; i++) {
+        if (own[i]) pass_own(loop->scene, rays[i], own[i], &hits[i]);
         if (hits[i].primitive != ES_NO_PRIMITIVE) put_hit(loop, places[i], &rays[i], &hits[i]);
         else store3(loop->level->background.at, places[i], es_trace_environment(loop->scene, es_v3(rays[i].direction[0], rays[i].direction[1], rays[i].direction[2])));
     }
@@ -163,7 +188,7 @@ static void ray_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
     const es_gbuffer* g = s->gbuffer;
     es_ray rays[RUN];
     size_t places[RUN];
-    uint32_t count = 0;
+    uint32_t own[RUN], count = 0; /* own: of the ray's own surface where it is edited to go behind that, else 0 */
     for (uint32_t j = begin; j < end; j++) {
         const size_t row = (size_t)j * loop->level->hits.stride;
         const uint32_t y = s->rectangle.row_begin + j;
@@ -182,16 +207,20 @@ static void ray_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
             store3(loop->level->along.at, to, direction);
             store3(loop->level->weight.at, to, weight);
             /* off the surface on the side that the ray goes to */
-            if (es_v3_dot(geometric, direction) < 0.0f) geometric = es_v3_scale(geometric, -1.0f);
+            own[count] = 0;
+            if (es_v3_dot(geometric, direction) < 0.0f) {
+                geometric = es_v3_scale(geometric, -1.0f);
+                if (is_edited(s, at)) own[count] = g->instance[at];
+            }
             const es_vec3 position = es_pixel_rays_position(&s->rays, (float)x, (float)y, g->depth[at]), o = es_offset_origin(es_v3_add(position, es_v3_scale(geometric, loop->offset)), geometric);
             rays[count] = (es_ray){{o.x, o.y, o.z}, 0.0f, {direction.x, direction.y, direction.z}, 3e38f};
             places[count++] = to;
             if (count < RUN) continue;
-            trace_run(loop, rays, places, count);
+            trace_run(loop, rays, places, own, count);
             count = 0;
         }
     }
-    trace_run(loop, rays, places, count);
+    trace_run(loop, rays, places, own, count);
 }
 
 /* ---- sums ----------------------------------------------------------------------------------------------------------------------------- */
