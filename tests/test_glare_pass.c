@@ -259,6 +259,28 @@ static void test_cycle(void** state)
     end(&s);
 }
 
+/* A cycle of another length has no spectra yet, be it at a moment that both have; what comes after finds one. */
+static void test_other_cycle(void** state)
+{
+    (void)state;
+    for (uint32_t glare = ES_GLARE_CONVOLUTION; glare <= ES_GLARE_BILLBOARDS; glare++) {
+        es_renderer_settings settings = settings_of(glare);
+        settings.glare_cycle = 2;
+        shown s = show(1, &settings);
+        frame(&s, 0);
+        settings.glare_cycle = 8;
+        assert_int_equal(es_renderer_configure(s.renderer, &settings), ES_OK);
+        frame(&s, 0);
+        assert_null(skipped(&s, "spectrum of glare"));
+        settings.glare_threshold = 2;
+        settings.glare_billboards = 7;
+        assert_int_equal(es_renderer_configure(s.renderer, &settings), ES_OK);
+        frame(&s, 0);
+        assert_null(skipped(&s, "glare"));
+        end(&s);
+    }
+}
+
 static void test_sizes(void** state)
 {
     (void)state;
@@ -338,6 +360,6 @@ static void test_memory(void** state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_light), unit_test_without_races(test_skipping), unit_test_without_races(test_cycle), unit_test_without_races(test_sizes), unit_test_without_races(test_refusals), unit_test_without_races(test_memory)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_light), unit_test_without_races(test_skipping), unit_test_without_races(test_cycle), unit_test_without_races(test_other_cycle), unit_test_without_races(test_sizes), unit_test_without_races(test_refusals), unit_test_without_races(test_memory)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -136,6 +136,7 @@ static es_result pass_cycle(es_renderer* r, double time)
     es_plan_begin(plan, ES_PASS_GLARE_SPECTRUM);
     es_plan_reads(plan, &settings, sizeof settings);
     es_plan_reads(plan, &moment, sizeof moment);
+    es_plan_reads(plan, &s->glare_cycle, sizeof s->glare_cycle); /* another length starts without spectra */
     reads_spectrum_settings(plan, r);
     if (!es_plan_run(plan, ES_PASS_GLARE_SPECTRUM)) return ES_OK;
     es_glare_moment* m = &g->cycle[moment];
