@@ -83,7 +83,7 @@ es_result es_pass_lamp_bounce(es_renderer* r, const es_frame_inputs* in)
     for (size_t i = 0; i < sizeof read / sizeof read[0]; i++) es_plan_reads_pass(plan, read[i]);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
     es_plan_reads(plan, &in->revisions.materials, sizeof in->revisions.materials);
-    const uint32_t words[] = {s->lamp_vpls, s->bounce_points, s->bounce_rays, s->seed, s->interleave, rays, maps, r->punctual_vpls};
+    const uint32_t words[] = {s->lamp_vpls, s->bounce_points, s->bounce_rays, s->seed, s->interleave, rays, maps, r->punctual_vpls, es_bounce_capacity(s) /* another one begins with empty room */};
     es_plan_reads(plan, words, sizeof words);
     const float numbers[] = {s->lamp_slope_bias, in->extent};
     es_plan_reads(plan, numbers, sizeof numbers);

@@ -335,6 +335,30 @@ static void test_moving_lamp(void** state)
     }
 }
 
+/* Other settings may want room for more lights of bounces, which begins empty: what lamps' bounce had put there is made again, where there is no other light as well. */
+static void test_more_lights(void** state)
+{
+    (void)state;
+    small_world w = small_world_create();
+    es_node node;
+    add_scene(&w, &node);
+    es_renderer_settings s = settings_of(ES_LAMPS_MAPS);
+    s.method = ES_GI_ISM;
+    s.vpls = 64;
+    s.lamp_vpls = 64;
+    s.interleave = 1;
+    es_renderer* renderer = renderer_of(&w, &s);
+    for (s.bounces = 1; s.bounces <= 3; s.bounces++) {
+        assert_int_equal(es_renderer_configure(renderer, &s), ES_OK);
+        es_image a = image_of(&w, renderer, "radiance"), b = rendered(&w, &s, "radiance");
+        assert_same_image(&a, &b);
+        es_image_destroy(w.context, &a);
+        es_image_destroy(w.context, &b);
+    }
+    es_renderer_destroy(renderer);
+    small_world_destroy(&w);
+}
+
 /* Where nothing glows, or only blackly, the passes are skipped and say why, and the picture has the bits that it has without them. */
 static void test_nothing_glows(void** state)
 {
@@ -493,6 +517,7 @@ int main(void)
         cmocka_unit_test(test_area_lights),
         cmocka_unit_test(test_places),
         cmocka_unit_test(test_moving_lamp),
+        cmocka_unit_test(test_more_lights),
         cmocka_unit_test(test_nothing_glows),
         cmocka_unit_test(test_furnace),
         cmocka_unit_test(test_open_box),
