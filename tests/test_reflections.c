@@ -808,6 +808,57 @@ static void test_ends(void** state)
     }
 }
 
+typedef struct scarce { int64_t left; } scarce; /* allocations until one fails; below 0: none does */
+
+static void* allocate_scarce(void* user, size_t size, size_t alignment)
+{
+    scarce* s = user;
+    if (s->left >= 0 && s->left-- == 0) return NULL;
+    return aligned_alloc(64, (size + 63) / 64 * 64);
+}
+static void release_scarce(void* user, void* pointer, size_t size)
+{
+    (void)user, (void)size;
+    free(pointer);
+}
+
+static void drop_message(void* user, es_log_level level, es_result item, const char* message) { (void)user, (void)level, (void)item, (void)message; }
+
+/* Whichever allocation of the first frame by rays fails, the next one has the picture that it would have had. */
+static void test_memory(void** state)
+{
+    (void)state;
+    uint64_t whole = 0;
+    bool failed = true;
+    for (int64_t n = -1; failed; n++) {
+        scarce memory = {-1};
+        es_context_desc desc = es_default_context_desc();
+        desc.allocator = (es_allocator){allocate_scarce, release_scarce, &memory};
+        desc.logger.log = drop_message;
+        desc.threads = 1;
+        es_context* context;
+        assert_int_equal(es_context_create(&desc, &context), ES_OK);
+        room r = make_room_in(context);
+        es_renderer_settings s = settings_of(24, 20);
+        s.reflection_size = 16;
+        s.method = ES_GI_NONE;
+        es_renderer* renderer = renderer_of(context, &s);
+        render(renderer, r.w.world);
+        s.reflections = ES_REFLECTIONS_TRACED;
+        assert_int_equal(es_renderer_configure(renderer, &s), ES_OK);
+        memory.left = n;
+        failed = es_renderer_render(renderer, r.w.world) != ES_OK || n < 0;
+        memory.left = -1;
+        render(renderer, r.w.world);
+        es_image image = picture(renderer, "radiance");
+        if (n < 0) whole = es_image_hash(&image);
+        else if (es_image_hash(&image) != whole) fail_msg("another picture after allocation %d failed", (int)n);
+        es_image_destroy(context, &image);
+        es_renderer_destroy(renderer);
+        small_world_destroy(&r.w);
+    }
+}
+
 static void test_settings(void** state)
 {
     (void)state;
@@ -837,6 +888,7 @@ int main(void)
         cmocka_unit_test(test_same_bits),
         cmocka_unit_test(test_second_reflections),
         unit_test_without_races(test_ends),
+        unit_test_without_races(test_memory),
         cmocka_unit_test(test_settings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

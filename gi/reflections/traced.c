@@ -31,7 +31,9 @@ static es_result resize(es_renderer* r, es_traced_level* l, uint32_t width, uint
     es_result result = es_gbuffer_create(r->context, width, height, HIT_PLANES, &l->hits);
     es_planes* const planes[] = {&l->found, &l->along, &l->background, &l->radiance, &l->second, &l->weight, &l->sum, &l->weights};
     for (size_t i = 0; i < sizeof planes / sizeof planes[0] && !result; i++) result = es_planes_resize(r->context, planes[i], &l->hits);
-    return result ? result : es_reflecting_buffers_resize(r->context, &l->reflecting, &l->hits);
+    if (!result) result = es_reflecting_buffers_resize(r->context, &l->reflecting, &l->hits);
+    if (result) es_traced_level_free(r->context, l); /* a part of it would pass for the whole */
+    return result;
 }
 
 es_layer_rectangle es_reflecting_rectangle(const es_gbuffer* g, const es_reflecting_planes* planes)
