@@ -239,6 +239,80 @@ void player_add_region(player* p) { p->edits.shown = true, add_region_at(p, (flo
 
 /* ---- moving ---------------------------------------------------------------------------------------------------------------------- */
 
+/* A free form goes along as it is: each end of a stroke to the place of the surface that is nearest to where it would be. */
+static bool move_strokes(player* p, es_region region, es_region_desc* desc, const es_anchor* to, es_region_stroke* strokes)
+{
+    es_world* world = p->session.world;
+    es_region_state state;
+    double target[3];
+    if (es_world_get_region_state(world, region, &state) != ES_OK || !es_world_resolve_anchor(world, to, target, NULL)) return false;
+    for (uint32_t i = 0; i < desc->stroke_count; i++) {
+        strokes[i] = desc->strokes[i];
+        es_anchor* const ends[2] = {&strokes[i].from, &strokes[i].to};
+        for (int k = 0; k < 2; k++) {
+            double place[3];
+            if (!es_world_resolve_anchor(world, ends[k], place, NULL)) return false;
+            for (int c = 0; c < 3; c++) place[c] += target[c] - state.centre[c];
+            if (es_world_anchor_of_point(world, to->instance, place, ends[k]) != ES_OK) return false;
+        }
+    }
+    desc->strokes = strokes;
+    return true;
+}
+
+static void move_region(player* p, const es_anchor* to)
+{
+    es_region_desc desc;
+    if (es_world_get_region(p->session.world, p->edits.region, &desc) != ES_OK) return;
+    es_region_stroke* strokes = malloc((desc.stroke_count + 1) * sizeof *strokes);
+    bool moves = strokes != NULL;
+    if (desc.type == ES_REGION_FREE_FORM) moves = moves && move_strokes(p, p->edits.region, &desc, to, strokes);
+    else desc.centre = *to;
+    if (moves && es_world_set_region(p->session.world, p->edits.region, &desc) != ES_OK) complain(p);
+    free(strokes);
+}
+
+/* What has keys gets one more where its parameter is now, or another in the place of that which is there. */
+static bool add_key(const player* p, es_constraint constraint, es_constraint_desc* desc, es_constraint_key* keys)
+{
+    es_constraint_state state;
+    if (es_world_get_constraint_state(p->session.world, constraint, &state) != ES_OK) return false;
+    const es_constraint_key key = {desc->key_count ? state.parameter : (float)es_world_time(p->session.world), desc->reflecting, desc->reflected, desc->direction};
+    uint32_t before = 0;
+    while (before < desc->key_count && desc->keys[before].at < key.at) before++;
+    const uint32_t replaced = before < desc->key_count && desc->keys[before].at == key.at;
+    if (before) memcpy(keys, desc->keys, before * sizeof *keys);
+    keys[before] = key;
+    if (before + replaced < desc->key_count) memcpy(keys + before + 1, desc->keys + before + replaced, (desc->key_count - before - replaced) * sizeof *keys);
+    desc->keys = keys;
+    desc->key_count += 1 - replaced;
+    return true;
+}
+
+static void set_constraint(player* p, es_constraint constraint, es_constraint_desc* desc, bool key)
+{
+    es_constraint_key* keys = malloc((desc->key_count + 1) * sizeof *keys);
+    const bool works = keys && (!(key || desc->key_count) || add_key(p, constraint, desc, keys));
+    if (works && es_world_set_constraint(p->session.world, constraint, desc) != ES_OK) complain(p);
+    free(keys);
+}
+
+/* Where its handles are now, between keys too. */
+static void take_present(const player* p, es_constraint constraint, es_constraint_desc* desc)
+{
+    es_constraint_state state;
+    if (!desc->key_count || es_world_get_constraint_state(p->session.world, constraint, &state) != ES_OK) return;
+    desc->reflecting = state.reflecting;
+    if (!desc->refraction) {
+        desc->reflected = (es_anchor){.kind = ES_ANCHOR_POINT};
+        memcpy(desc->reflected.point, state.target, sizeof state.target);
+    } else {
+        uint32_t last = 0;
+        while (last + 1 < desc->key_count && desc->keys[last + 1].at <= state.parameter) last++;
+        desc->direction = desc->keys[last].direction;
+    }
+}
+
 static void move_held(player* p, float x, float y)
 {
     player_edits* e = &p->edits;
@@ -246,16 +320,12 @@ static void move_held(player* p, float x, float y)
     es_anchor anchor;
     const bool on_surface = anchor_at(p, x, y, &anchor);
     if (e->held == HANDLE_BLUE) {
-        es_region_desc desc;
-        if (!on_surface || es_world_get_region(world, e->region, &desc) != ES_OK) return;
-        desc.centre = anchor;
-        if (desc.type != ES_REGION_FREE_FORM && es_world_set_region(world, e->region, &desc) != ES_OK) complain(p);
+        if (on_surface) move_region(p, &anchor);
         return;
     }
     es_constraint_desc desc;
     if (es_world_get_constraint(world, e->constraint, &desc) != ES_OK) return;
-    desc.keys = NULL;
-    desc.key_count = 0;
+    take_present(p, e->constraint, &desc);
     if (e->held == HANDLE_RED) {
         if (!on_surface) return;
         desc.reflecting = anchor;
@@ -277,7 +347,7 @@ static void move_held(player* p, float x, float y)
         desc.reflected = (es_anchor){.kind = ES_ANCHOR_POINT};
         world_of_eye(&look, eye_of_pixel(&look, x, y, e->distance), desc.reflected.point);
     }
-    if (es_world_set_constraint(world, e->constraint, &desc) != ES_OK) complain(p);
+    set_constraint(p, e->constraint, &desc, false);
 }
 
 static bool hold(player* p, edits_handle handle, es_constraint constraint, es_region region, bool by_keyboard)
@@ -658,6 +728,20 @@ static void constraint_rows(player* p)
     ui_next_row(u);
     if (ui_switch(u, "surface", 14, "Over surface", desc.geodesic)) desc.geodesic = !desc.geodesic, changed = true;
     if (ui_button(u, "view", 16, "Return to view")) player_return_to_view(p);
+    if (ui_button(u, "key", 5, "Key")) { /* from then on dragging a handle sets one */
+        take_present(p, p->edits.constraint, &desc);
+        begin(p);
+        set_constraint(p, p->edits.constraint, &desc, true);
+        committed(p, "key");
+        player_notice(p, "a key; dragging a handle at other times sets further ones");
+        return;
+    }
+    if (desc.key_count && ui_button(u, "no keys", 9, "No keys")) {
+        take_present(p, p->edits.constraint, &desc);
+        desc.keys = NULL;
+        desc.key_count = 0;
+        changed = true;
+    }
     ui_next_row(u);
     if (state.effect != ES_EDIT_ACTIVE) ui_label(u, 0, UI_CHANGED, es_edit_effect_text(state.effect));
     else if (!(state.influence > 0)) ui_label(u, 0, UI_CHANGED, "in no region: without effect");

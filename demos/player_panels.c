@@ -208,7 +208,7 @@ void player_build_panels(player* p)
     }
     if (p->show_micro) player_micro_panel(p, bottom);
     if (p->edits.shown) {
-        const int width = columns(p, 44), height = 9 * u->row + 12 * u->scale;
+        const int width = columns(p, 44), height = 10 * u->row + 12 * u->scale;
         player_edits_panel(p, (canvas_rect){0, bottom - height, width, height});
     }
     if (p->show_settings) {
