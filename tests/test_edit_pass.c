@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "platform/random.h"
+#include "tests/races.h"
 #include "tests/same_bits.h"
 #include "tests/small_worlds.h"
 
@@ -370,13 +371,13 @@ static void test_gone(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_highlight_moves),
-        cmocka_unit_test(test_the_rest_stays),
-        cmocka_unit_test(test_diffuse_stays),
-        cmocka_unit_test(test_lawful_constraint),
-        cmocka_unit_test(test_skipping),
+        unit_test_without_races(test_highlight_moves),
+        unit_test_without_races(test_the_rest_stays),
+        unit_test_without_races(test_diffuse_stays),
+        unit_test_without_races(test_lawful_constraint),
+        unit_test_without_races(test_skipping),
         cmocka_unit_test(test_same_everywhere),
-        cmocka_unit_test(test_gone),
+        unit_test_without_races(test_gone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "platform/random.h"
+#include "tests/races.h"
 #include "tests/same_bits.h"
 #include "tests/small_worlds.h"
 
@@ -237,10 +238,10 @@ static void test_same_everywhere(void** state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_without_edits),
-        cmocka_unit_test(test_reflected_point),
-        cmocka_unit_test(test_behind),
-        cmocka_unit_test(test_outside),
+        unit_test_without_races(test_without_edits),
+        unit_test_without_races(test_reflected_point),
+        unit_test_without_races(test_behind),
+        unit_test_without_races(test_outside),
         cmocka_unit_test(test_same_everywhere),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -49,17 +49,30 @@ static void fill(complex_picture* p)
         }
 }
 
+/* cos and sin of sign 2 pi k / n */
+static double* circle(uint32_t n, int sign)
+{
+    double* table = malloc(2 * (size_t)n * sizeof *table);
+    for (uint32_t k = 0; k < n; k++) {
+        const double a = sign * 2 * PI * (double)k / n;
+        table[2 * k] = cos(a);
+        table[2 * k + 1] = sin(a);
+    }
+    return table;
+}
+
 /* by sums over rows, then columns, in double */
 static double* slow_transform(const complex_picture* p, int sign)
 {
     const uint32_t w = p->width, h = p->height;
     double* middle = malloc((size_t)w * h * 2 * sizeof *middle);
     double* result = malloc((size_t)w * h * 2 * sizeof *result);
+    double *along = circle(w, sign), *down = circle(h, sign);
     for (uint32_t y = 0; y < h; y++)
         for (uint32_t k = 0; k < w; k++) {
             double sum_re = 0, sum_im = 0;
-            for (uint32_t x = 0; x < w; x++) {
-                const double a = sign * 2 * PI * (double)((uint64_t)x * k % w) / w, c = cos(a), s = sin(a);
+            for (uint32_t x = 0, at = 0; x < w; x++, at = at + k >= w ? at + k - w : at + k) {
+                const double c = along[2 * at], s = along[2 * at + 1];
                 sum_re += re(p, x, y) * c - im(p, x, y) * s;
                 sum_im += re(p, x, y) * s + im(p, x, y) * c;
             }
@@ -69,8 +82,8 @@ static double* slow_transform(const complex_picture* p, int sign)
     for (uint32_t k = 0; k < h; k++)
         for (uint32_t x = 0; x < w; x++) {
             double sum_re = 0, sum_im = 0;
-            for (uint32_t y = 0; y < h; y++) {
-                const double a = sign * 2 * PI * (double)((uint64_t)y * k % h) / h, c = cos(a), s = sin(a);
+            for (uint32_t y = 0, at = 0; y < h; y++, at = at + k >= h ? at + k - h : at + k) {
+                const double c = down[2 * at], s = down[2 * at + 1];
                 const double* m = middle + 2 * ((size_t)y * w + x);
                 sum_re += m[0] * c - m[1] * s;
                 sum_im += m[0] * s + m[1] * c;
@@ -79,6 +92,8 @@ static double* slow_transform(const complex_picture* p, int sign)
             result[2 * ((size_t)k * w + x) + 1] = sum_im;
         }
     free(middle);
+    free(along);
+    free(down);
     return result;
 }
 
