@@ -379,6 +379,22 @@ if play rokeby --size 320x240 "${still[@]}"; then
     quit
 fi
 
+# ---- a constraint on glass is one of refraction ---------------------------------------------------------------------------------------
+cat >pane.gltf <<'GLTF'
+{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "pane"}],
+ "extensionsUsed": ["KHR_materials_transmission"], "materials": [{"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, -3], "max": [1, 1, -3]},
+               {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+ "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
+ "buffers": [{"byteLength": 60, "uri": "data:application/octet-stream;base64,AACAvwAAgL8AAEDAAACAPwAAgL8AAEDAAACAPwAAgD8AAEDAAACAvwAAgD8AAEDAAAABAAIAAAACAAMA"}]}
+GLTF
+if play pane.gltf --size 320x240 "${small[@]}"; then
+    key ctrl+n ctrl+w
+    check 'a constraint on glass is none of refraction' grep -q refraction pane-edits.gltf
+    quit
+fi
+
 # ---- Wayland: a compositor in a window of the same screen, which gives the player all of it ------------------------------
 wayland()
 {
