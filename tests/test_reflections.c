@@ -711,6 +711,38 @@ static void test_skipping_changes_nothing(void** state)
     }
 }
 
+/* A skinned animal comes to rest with other bounds than it moved with, and then its surroundings are seen from another middle. */
+static void test_deformed(void** state)
+{
+    (void)state;
+    small_world w = small_world_create();
+    es_world_destroy(w.world);
+    es_world_settings settings = es_default_world_settings();
+    settings.triangles = 5000;
+    assert_int_equal(es_world_create_scene(w.context, "creature", &settings, &w.world), ES_OK);
+    es_renderer_settings s = settings_of(32, 61);
+    s.method = ES_GI_NONE;
+    s.lamps = ES_LAMPS_NONE;
+    s.reflection_size = 32;
+    s.reflection_roughness = 1;
+    s.reflection_maps = 1;
+    es_renderer* skips = renderer_of(w.context, &s);
+    s.skip = false;
+    es_renderer* draws = renderer_of(w.context, &s);
+    for (int frame = 0; frame < 4; frame++) {
+        assert_int_equal(es_world_step(w.world, frame == 1 ? 1.0f / 30 : 0), ES_OK);
+        render(skips, w.world);
+        render(draws, w.world);
+        es_image a = picture(skips, "reflections"), b = picture(draws, "reflections");
+        if (memcmp(a.pixels, b.pixels, (size_t)a.width * a.height * 3 * sizeof(float))) fail_msg("frame %d differs", frame);
+        es_image_destroy(w.context, &a);
+        es_image_destroy(w.context, &b);
+    }
+    es_renderer_destroy(skips);
+    es_renderer_destroy(draws);
+    small_world_destroy(&w);
+}
+
 static void test_same_bits(void** state)
 {
     (void)state;
@@ -885,6 +917,7 @@ int main(void)
         unit_test_without_races(test_rays_in_a_box),
         cmocka_unit_test(test_drawn_when),
         unit_test_without_races(test_skipping_changes_nothing),
+        unit_test_without_races(test_deformed),
         cmocka_unit_test(test_same_bits),
         cmocka_unit_test(test_second_reflections),
         unit_test_without_races(test_ends),

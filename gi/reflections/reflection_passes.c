@@ -287,6 +287,11 @@ es_result es_pass_reflection_maps(es_renderer* r, const es_frame_inputs* in)
     es_plan_begin(plan, ES_PASS_REFLECTION_MAPS);
     es_plan_reads(plan, &light, sizeof light);
     es_plan_reads(plan, &in->revisions.geometry, sizeof in->revisions.geometry);
+    /* bounds hold last frame's vertices as well, so a middle comes to rest a frame after its thing */
+    for (uint32_t i = 0; i < f->map_count; i++) {
+        es_plan_reads(plan, &f->maps[i].centre, sizeof f->maps[i].centre);
+        es_plan_reads(plan, &f->maps[i].near_plane, sizeof f->maps[i].near_plane);
+    }
     if (!es_plan_run(plan, ES_PASS_REFLECTION_MAPS)) return ES_OK;
     uint64_t drawn = 0, triangles = 0;
     es_result result = ES_OK;
