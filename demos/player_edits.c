@@ -135,7 +135,7 @@ static bool is_transmissive(const player* p, es_instance instance)
     return es_world_get_instance(p->session.world, instance, &desc) == ES_OK && es_world_get_material(p->session.world, desc.material, &material) == ES_OK && material.transmission > 0.5f;
 }
 
-/* What is seen there now is what it begins with. */
+/* A reflection begins with what is seen there now, a refraction with the way straight on. */
 static void add_constraint_at(player* p, float x, float y)
 {
     player_edits* e = &p->edits;

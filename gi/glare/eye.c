@@ -7,6 +7,9 @@
 #include "platform/maths.h"
 #include "platform/random.h"
 
+/* mm: the hippus of a narrower one is no faster, nor does its phase leave what counts its steps */
+#define LEAST_PUPIL 1e-3f
+
 enum { BEFORE = 2 * ES_GRID_RATE }; /* steps from rest to the first time that is asked for */
 static const float field_seconds = 0.5f; /* towards brighter; the pupil itself takes as long */
 
@@ -64,7 +67,7 @@ static void step(es_eye* eye, double target)
     es_adaptation_step(&eye->field, target, field_seconds, dt);
     const float mean = mean_pupil(eye);
     /* eq. 8.1 has noise(t / p); where p changes it is the rate that does, or a long time's phase would leap */
-    if (mean > 0) eye->phase += (double)dt / (double)mean;
+    if (mean > 0) eye->phase += (double)dt / (double)es_maxf(mean, LEAST_PUPIL);
     if (s->accommodation > 0 && (s->lens || s->gratings)) es_lens_step(&eye->lens, s->accommodation * es_lens_accommodation(seed_of(eye, ACCOMMODATION), es_grid_time(eye->grid.step), mean));
     if (s->vitreous) es_vitreous_step(&eye->vitreous, seed_of(eye, SACCADES), eye->grid.step, s->saccades);
     set_pupil_and_lids(eye, mean);
@@ -86,7 +89,7 @@ void es_eye_advance(es_eye* eye, const es_eye_subject* subject, double time, flo
         begin(eye, to - BEFORE);
         es_adaptation_step(&eye->field, target, 0, 0);
         const float mean = mean_pupil(eye);
-        eye->phase = mean > 0 ? es_grid_time(eye->grid.step) / (double)mean : 0;
+        eye->phase = mean > 0 ? es_grid_time(eye->grid.step) / (double)es_maxf(mean, LEAST_PUPIL) : 0;
         steps = BEFORE;
     }
     for (int64_t i = 0; i < steps; i++) step(eye, target);

@@ -179,7 +179,7 @@ static void reflect(const direct_row* row, const stretch* s)
         } else {
             vf p[3], d[3], v[3], nx, ny, nz;
             place(row, x, vf_load(g->depth + at), p, d);
-            vf inverse = vf_set1(-1.0f) / vf_sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            vf inverse = vf_set1(-1.0f) / vf_sqrt(vf_max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2], vf_set1(1e-30f))) /* rays that found nothing have no direction */;
             for (int k = 0; k < 3; k++) v[k] = rays->orthographic ? vf_set1(-rays->dir[k]) : d[k] * inverse;
             es_unpack_normal_v(vi_load(g->normal + at), &nx, &ny, &nz);
             es_lift_to_horizon_v(nx, ny, nz, &v[0], &v[1], &v[2]);

@@ -215,7 +215,7 @@ VINL void es_reflection_meet_v(const es_reflection_atlas* atlas, vi first, const
     t = es_reflection_root_v(&s.met);
     for (int k = 0; k < 3; k++) met[k] = vf_select(s.found, x[k] + t * d[k], d[k]);
     distance = vf_sqrt(met[0] * met[0] + met[1] * met[1] + met[2] * met[2]);
-    *spread = vf_select(s.found, t / vf_max(distance, vf_set1(1e-20f)), one);
+    *spread = vf_select(s.found, vf_and(s.found, t) / vf_max(distance, vf_set1(1e-20f)), one);
 }
 
 /* es_reflection_level_of_alpha, between powers of two straight in alpha */
