@@ -109,8 +109,7 @@ static es_result shade(es_renderer* r, const es_lit_surfaces* of, uint32_t light
     job.vpls = lamps->set.shaded;
     job.vpl_count = lights;
     job.map_of = lamps->set.map_of;
-    if (of->lobes && !r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
-    job.wide = &r->micro.lobes;
+    job.wide = &es_lobe_albedos;
     for (int k = 0; k < 3; k++) {
         job.irradiance[k] = irradiance->at[k];
         job.specular[k] = of->lobes ? specular->at[k] : NULL;

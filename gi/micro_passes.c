@@ -86,31 +86,30 @@ static es_result add_vpls(es_renderer* r, uint32_t bounces)
     const es_shade_job lights = {.vpls = r->vpls, .vpl_count = r->vpl_count, .dark_count = r->vpl_count - es_bounce_end(r, bounces), .maps = r->maps.texels, .map_size = r->maps.size,
         .far_distance = r->maps.far_distance, .bias = s->ism_bias * extent, .slope_bias = s->ism_slope_bias * extent, .spread = s->spread, .lobe_roughness = s->lobe_roughness,
         .geometry_bound = s->geometry_bound / (extent * extent), .interleave = 1};
-    return es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &lights, s->micro_level, &r->micro.lobes);
+    return es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &lights, s->micro_level, &es_lobe_albedos);
 }
 
 /* What the points send once light has met up to `bounces` surfaces, theirs the last, with the settings of the frame that is being, or was last, rendered. */
 static es_result light_points(es_renderer* r, uint32_t bounces)
 {
     const es_renderer_settings* s = &r->frame.settings;
-    if (!r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
     const bool lamps = es_lamps_are_there(r);
     bool glossy = false;
     for (uint32_t i = 0; i < r->micro.forest.tree_count && s->micro_lobes; i++) glossy = glossy || r->micro.forest.trees[i].glossy;
     if (glossy) es_lobe_shapes_fill(r->context, &r->micro.shapes);
     const es_point_light_job direct = {.views = r->light_views, .view_count = r->light_count, .shadow_filter = s->shadow_filter, .shadow_bias = s->shadow_bias,
-        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission && !lamps, .lobes = &r->micro.lobes,
+        .shadow_slope_bias = s->shadow_slope_bias, .emission = s->micro_emission && !lamps, .lobes = &es_lobe_albedos,
         .shapes = glossy ? &r->micro.shapes : NULL};
     es_result result = es_points_light_direct(r->context, &r->micro.forest, &direct);
     es_arena_reset(&r->arena);
     /* photons that leave what glows bring its light to the points */
     if (!result && lamps && !(bounces > 1 && s->micro_light == ES_MICRO_LIGHT_PHOTONS && s->micro_emission)) {
         const es_shade_job set = es_lamps_at_points(r);
-        result = es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &set, s->micro_level, &r->micro.lobes);
+        result = es_points_light_vpls(r->context, &r->arena, &r->micro.forest, &set, s->micro_level, &es_lobe_albedos);
     }
     if (!result && bounces > 1) {
-        const es_radiosity_job radiosity = {.level = s->micro_level, .iterations = bounces - 1, .micro = es_micro_settings_of(s), .seed = s->seed, .lobes = &r->micro.lobes};
-        const es_photon_job photons = {.scene = &r->trace_scene, .photons = s->micro_photons, .bounces = bounces - 1, .seed = s->seed, .emission = s->micro_emission, .lobes = &r->micro.lobes};
+        const es_radiosity_job radiosity = {.level = s->micro_level, .iterations = bounces - 1, .micro = es_micro_settings_of(s), .seed = s->seed, .lobes = &es_lobe_albedos};
+        const es_photon_job photons = {.scene = &r->trace_scene, .photons = s->micro_photons, .bounces = bounces - 1, .seed = s->seed, .emission = s->micro_emission, .lobes = &es_lobe_albedos};
         if (s->micro_light == ES_MICRO_LIGHT_VPLS) result = add_vpls(r, bounces - 1);
         if (s->micro_light == ES_MICRO_LIGHT_RADIOSITY) result = es_points_light_radiosity(r->context, &r->arena, &r->micro.forest, &radiosity, NULL);
         if (s->micro_light == ES_MICRO_LIGHT_PHOTONS) result = es_points_light_photons(r->context, &r->arena, &r->micro.forest, &photons, NULL);

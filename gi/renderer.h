@@ -35,7 +35,6 @@ typedef struct es_frame_settings { es_renderer_settings settings; float extent; 
 /* What micro-buffers are drawn of, and planes of theirs besides the renderer's (gi/micro_passes.h). */
 typedef struct es_micro_buffers {
     es_point_forest forest;
-    es_lobe_albedo lobes;
     es_lobe_shapes shapes;
     uint32_t spacing;          /* that the next two have pixels for */
     es_planes sparse_irradiance, sparse_specular;

@@ -313,11 +313,7 @@ static void test_same_bits(void** state)
 
 int main(void)
 {
-    es_context_desc desc = es_default_context_desc();
-    es_context* context;
-    if (es_context_create(&desc, &context) != ES_OK) return 1;
-    es_lobe_albedo_fill(context, &lobes);
-    es_context_destroy(context);
+    lobes = es_lobe_albedos;
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_constant_light), cmocka_unit_test(test_disc_overhead), cmocka_unit_test(test_rays_close_holes), cmocka_unit_test(test_awkward_places), cmocka_unit_test(test_shared_view), cmocka_unit_test(test_same_bits)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

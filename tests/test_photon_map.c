@@ -36,7 +36,7 @@ static void bring(room* r, bool emission)
     r->scene.context = r->w.context;
     assert_int_equal(es_trace_scene_take(&r->scene, r->w.world, emission), ES_OK);
     es_arena_init(&r->arena, r->w.context, 1 << 20);
-    es_lobe_albedo_fill(r->w.context, &lobes);
+    lobes = es_lobe_albedos;
 }
 
 static void leave(room* r)

@@ -29,7 +29,7 @@ static es_context* open_context(uint32_t threads, uint32_t isa_mask)
     desc.isa_mask = isa_mask;
     es_context* context;
     assert_int_equal(es_context_create(&desc, &context), ES_OK);
-    es_lobe_albedo_fill(context, &lobes);
+    lobes = es_lobe_albedos;
     return context;
 }
 

@@ -22,7 +22,7 @@ static es_lobe_albedo lobes;
 
 static es_point_light_job job_of(const lit_world* l)
 {
-    es_lobe_albedo_fill(l->w.context, &lobes);
+    lobes = es_lobe_albedos;
     const es_renderer_settings s = es_default_renderer_settings();
     return (es_point_light_job){.views = l->views, .view_count = l->count, .shadow_filter = s.shadow_filter, .shadow_bias = s.shadow_bias, .shadow_slope_bias = s.shadow_slope_bias, .lobes = &lobes};
 }

@@ -24,7 +24,7 @@ static es_lobe_shapes shapes;
 
 static es_point_light_job job_of(const lit_world* l, bool apart)
 {
-    es_lobe_albedo_fill(l->w.context, &albedos);
+    albedos = es_lobe_albedos;
     es_lobe_shapes_fill(l->w.context, &shapes);
     const es_renderer_settings s = es_default_renderer_settings();
     return (es_point_light_job){.views = l->views, .view_count = l->count, .shadow_filter = s.shadow_filter, .shadow_bias = s.shadow_bias, .shadow_slope_bias = s.shadow_slope_bias, .lobes = &albedos,

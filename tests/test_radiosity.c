@@ -30,7 +30,7 @@ static void bring(room* r)
     es_forest_update update;
     assert_int_equal(es_forest_bring(r->w.context, &r->forest, es_world_draw_list(r->w.world), es_world_get_revisions(r->w.world).materials, &request, &update), ES_OK);
     es_arena_init(&r->arena, r->w.context, 1 << 20);
-    es_lobe_albedo_fill(r->w.context, &lobes);
+    lobes = es_lobe_albedos;
 }
 
 static void leave(room* r)
@@ -160,8 +160,7 @@ static void test_same_bits(void** state)
         assert_int_equal(es_world_step(r.w.world, 0), ES_OK);
         assert_int_equal(es_forest_bring(context, &r.forest, es_world_draw_list(r.w.world), 1, &request, &update), ES_OK);
         es_arena_init(&r.arena, context, 1 << 20);
-        lobes.filled = false;
-        es_lobe_albedo_fill(context, &lobes);
+        lobes = es_lobe_albedos;
         glow(&r);
         es_radiosity_job job = job_of(2);
         job.level = 6;

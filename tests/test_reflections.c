@@ -300,7 +300,7 @@ static void test_furnace(void** state)
         render(renderer, w.world);
         es_image reflections = picture(renderer, "reflections"), radiance = picture(renderer, "radiance"), normal = picture(renderer, "normal");
         es_lobe_albedo* table = calloc(1, sizeof *table);
-        es_lobe_albedo_fill(w.context, table);
+        *table = es_lobe_albedos;
         for (uint32_t y = 0; y < SIZE; y++)
             for (uint32_t x = 0; x < SIZE; x++) {
                 const size_t at = 3 * ((size_t)y * SIZE + x);

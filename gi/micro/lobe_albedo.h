@@ -7,20 +7,18 @@
 #define EARTHSHINE_GI_MICRO_LOBE_ALBEDO_H
 
 #include "gi/surface.h"
-#include "platform/context.h"
 
 /* Rows: roughness k / 16, exponents 51 (k / 16)² (the G-buffer holds none above 51). Columns: cosines k / 32. Between, both are linear. */
 enum { ES_LOBE_ROWS = 17, ES_LOBE_COLUMNS = 33 };
 #define ES_LOBE_MAX_EXPONENT 51.0f
 
 typedef struct es_lobe_albedo {
-    bool filled;
     float low[ES_LOBE_ROWS * ES_LOBE_COLUMNS], high[ES_LOBE_ROWS * ES_LOBE_COLUMNS], phong[ES_LOBE_ROWS * ES_LOBE_COLUMNS];
     float mean_low[ES_LOBE_ROWS], mean_high[ES_LOBE_ROWS], mean_phong[ES_LOBE_ROWS]; /* of light that comes evenly from the hemisphere */
 } es_lobe_albedo;
 
-/* Some milliseconds, once. */
-void es_lobe_albedo_fill(es_context* context, es_lobe_albedo* table);
+/* gi/micro/lobe_albedo_values.c: made and checked by tests/check_lobe_albedo.c; making it takes some milliseconds, which every renderer would. */
+extern const es_lobe_albedo es_lobe_albedos;
 
 /* One at a time; gi/kernels/lobe_albedo_simd.h has the same. cosine in [0, 1]. */
 es_vec3 es_lobe_albedo_at(const es_lobe_albedo* table, const es_surface* surface, float cosine);

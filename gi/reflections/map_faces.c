@@ -195,7 +195,7 @@ es_result es_reflection_draw(es_renderer* r, const es_frame_inputs* in, uint32_t
         result = es_draw_gbuffer(r->rasterizer, &f->others, &views[i], &f->face, &stats);
         if (result) return result;
         *triangles += stats.triangles;
-        const es_reflecting_job reflecting = {.gbuffer = &f->face, .rays = rays, .map_of = f->map_of, .roughness = r->settings.reflection_roughness, .lobes = &r->micro.lobes, .out = f->on_face.planes};
+        const es_reflecting_job reflecting = {.gbuffer = &f->face, .rays = rays, .map_of = f->map_of, .roughness = r->settings.reflection_roughness, .lobes = &es_lobe_albedos, .out = f->on_face.planes};
         es_reflecting_find(r->context, &reflecting);
         result = light_face(r, in, &rays);
         if (!result) result = list_second(r, map, &rays, first);

@@ -239,10 +239,9 @@ es_result es_pass_reflecting(es_renderer* r, const es_frame_inputs* in)
     es_plan_reads(plan, f->map_of, f->map_of_count * sizeof *f->map_of);
     es_plan_reads(plan, &r->settings.reflection_roughness, sizeof r->settings.reflection_roughness);
     if (!es_plan_run(plan, ES_PASS_REFLECTING)) return ES_OK;
-    es_lobe_albedo_fill(r->context, &r->micro.lobes);
     result = es_reflecting_buffers_resize(r->context, &f->on_picture, &r->gbuffer);
     if (result) return result;
-    const es_reflecting_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .map_of = f->map_of, .roughness = r->settings.reflection_roughness, .lobes = &r->micro.lobes, .out = f->on_picture.planes};
+    const es_reflecting_job job = {.gbuffer = &r->gbuffer, .rays = r->rays, .map_of = f->map_of, .roughness = r->settings.reflection_roughness, .lobes = &es_lobe_albedos, .out = f->on_picture.planes};
     es_reflecting_find(r->context, &job);
     es_plan_done(plan, ES_PASS_REFLECTING, (uint64_t)r->gbuffer.width * r->gbuffer.height);
     return ES_OK;

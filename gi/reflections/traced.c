@@ -254,7 +254,7 @@ static void sum_rows(void* user, uint32_t begin, uint32_t end, uint32_t worker)
 static es_result add_second(es_renderer* r, const es_frame_inputs* in, es_traced_level* l, const es_pixel_rays* hit_rays, bool* any, uint64_t* rays)
 {
     es_reflections* f = &r->reflections;
-    const es_reflecting_job find = {.gbuffer = &l->hits, .rays = *hit_rays, .map_of = f->map_of, .roughness = r->settings.reflection_roughness, .lobes = &r->micro.lobes, .out = l->reflecting.planes};
+    const es_reflecting_job find = {.gbuffer = &l->hits, .rays = *hit_rays, .map_of = f->map_of, .roughness = r->settings.reflection_roughness, .lobes = &es_lobe_albedos, .out = l->reflecting.planes};
     es_reflecting_find(r->context, &find);
     const es_traced_source source = {.gbuffer = &l->hits, .rays = *hit_rays, .planes = &l->reflecting.planes, .rectangle = es_reflecting_rectangle(&l->hits, &l->reflecting.planes), .level = 1, .rays_per_pixel = 1};
     *any = source.rectangle.row_end > 0;

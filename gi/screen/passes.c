@@ -78,10 +78,9 @@ static es_result occlude(es_renderer* r, const es_frame_inputs* in)
     es_occlusion(r->context, &job);
     if (s->screen_sets > 1) result = filter_patterns(r, 1, b->directional ? 3 : 1, &b->share, &b->filtered_share);
     if (result) return result;
-    if (b->has_specular && !r->micro.lobes.filled) es_lobe_albedo_fill(r->context, &r->micro.lobes);
     es_compose_job lamps = {0};
     es_lamps_compose(r, &lamps);
-    es_arriving_job arriving = {.gbuffer = &r->gbuffer, .rays = r->rays, .environment = &r->environment.lookup, .lobes = &r->micro.lobes, .lit = b->has_specular ? b->reflected.lit : NULL};
+    es_arriving_job arriving = {.gbuffer = &r->gbuffer, .rays = r->rays, .environment = &r->environment.lookup, .lobes = &es_lobe_albedos, .lit = b->has_specular ? b->reflected.lit : NULL};
     for (int k = 0; k < 3; k++) {
         arriving.share[k] = b->filtered_share.at[b->directional ? k : 0];
         arriving.irradiance[k] = lamps.lamp_irradiance[k];
