@@ -10,6 +10,8 @@
 #include <cmocka.h>
 
 #include "gi/edit/edit.h"
+#include "gi/edit/turn.h"
+#include "gi/kernels/edited_lobe_simd.h"
 #include "gi/kernels/rotation_simd.h"
 #include "platform/maths.h"
 #include "platform/random.h"
@@ -122,6 +124,22 @@ static void test_rotation_of_odd_matrices(void** state)
     double r[9];
     nearest(of[0], r);
     for (int k = 0; k < 9; k++) assert_true(r[k] == (k % 4 == 0 ? 1.0 : 0.0));
+}
+
+/* Alone and on eight lanes: `from` becomes `to`, also where they are opposite, and lengths stay. Within 1e-3 of opposite the arc has no axis to speak of. */
+static void test_turning(void** state)
+{
+    (void)state;
+    for (int i = 0; i < 2000; i++) {
+        const es_vec3 from = direction(), to = i % 4 ? direction() : es_v3_scale(from, -1.0f), v = direction(), turned = es_turned(v, from, to);
+        const es_vec3 end = es_turned(from, from, to);
+        assert_true(fabsf(es_v3_length(turned) - 1.0f) < 1e-5f);
+        if (i % 4 == 0 || es_v3_dot(from, to) > -0.999f) assert_true(es_v3_length(es_v3_sub(end, to)) < 1e-4f);
+        const vf a[3] = {vf_set1(from.x), vf_set1(from.y), vf_set1(from.z)}, b[3] = {vf_set1(to.x), vf_set1(to.y), vf_set1(to.z)};
+        vf x[3] = {vf_set1(v.x), vf_set1(v.y), vf_set1(v.z)};
+        es_turn_v(a, b, x);
+        assert_true(es_v3_length(es_v3_sub(turned, es_v3(x[0][0], x[1][0], x[2][0]))) < 1e-3f);
+    }
 }
 
 /* ---- the field ------------------------------------------------------------------------------------------------------------------- */
@@ -419,6 +437,7 @@ int main(void)
         cmocka_unit_test(test_nearest_rotation),
         cmocka_unit_test(test_rotation_is_its_own_nearest),
         cmocka_unit_test(test_rotation_of_odd_matrices),
+        cmocka_unit_test(test_turning),
         cmocka_unit_test(test_exact_at_constraints),
         cmocka_unit_test(test_one_constraint_turns_alike),
         cmocka_unit_test(test_borders),

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/edit/turn.h"
 #include "gi/lit.h"
 #include "gi/micro/gather.h"
 #include "gi/surface.h"
@@ -55,21 +56,12 @@ static void put(float to[3], es_vec3 from)
     to[2] = from.z;
 }
 
-/* x as the rotation by the shortest arc from `from` to `to` takes it (gi/kernels/edited_lobe_simd.h). */
-static void turn_vector(es_vec3 from, es_vec3 to, float x[3])
-{
-    const es_vec3 sum = es_v3_add(from, to), v = es_v3(x[0], x[1], x[2]);
-    const float a = es_v3_dot(sum, v) / es_maxf(1.0f + es_v3_dot(from, to), 1e-4f), b = 2.0f * es_v3_dot(from, v);
-    const es_vec3 turned = es_v3_add(es_v3_sub(v, es_v3_scale(sum, a)), es_v3_scale(to, b));
-    put(x, es_v3_normalize(turned, v));
-}
-
 static void turn(es_gather_point* point, es_vec3 edited)
 {
     if (!(es_v3_dot(edited, edited) > 0.0f)) return;
     const es_vec3 r = es_micro_mirror(point);
-    turn_vector(r, edited, point->normal);
-    turn_vector(r, edited, point->view);
+    put(point->normal, es_turned(es_v3(point->normal[0], point->normal[1], point->normal[2]), r, edited));
+    put(point->view, es_turned(es_v3(point->view[0], point->view[1], point->view[2]), r, edited));
 }
 
 /* Pixel (x, y) of the whole image. */

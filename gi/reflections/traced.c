@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "gi/edit/turn.h"
 #include "gi/lit.h"
 #include "gi/reflections/found_light.h"
 #include "gi/reflections/map_faces.h"
@@ -77,17 +78,6 @@ static void store3(float* const planes[3], size_t at, es_vec3 v)
     planes[2][at] = v.z;
 }
 
-/* v turned as from is turned to `to`, both unit, by the shortest way. */
-static es_vec3 turned(es_vec3 v, es_vec3 from, es_vec3 to)
-{
-    const float c = es_v3_dot(from, to);
-    if (c < -0.9999f) return es_v3_scale(v, -1.0f);
-    const es_vec3 axis = es_v3_cross(from, to);
-    /* Rodrigues */
-    const es_vec3 across = es_v3_cross(axis, v);
-    return es_v3_add(es_v3_add(es_v3_scale(v, c), across), es_v3_scale(axis, es_v3_dot(axis, v) / (1.0f + c)));
-}
-
 static es_vec3 edited_at(const es_traced_source* s, size_t at) { return s->edited[0] ? load3(s->edited, at) : es_v3(0, 0, 0); }
 static bool is_edited(const es_traced_source* s, size_t at)
 {
@@ -117,7 +107,7 @@ static bool direction_of(const ray_loop* loop, size_t at, uint32_t x, uint32_t y
     es_surface_sample chosen;
     if (!es_surface_sample_direction(&surface, n, wo, three, &chosen)) return false;
     if (!turns && !(es_v3_dot(geometric, chosen.wi) > 0.0f)) return false;
-    *direction = turns ? es_v3_normalize(turned(chosen.wi, mirrored, edited), edited) : chosen.wi;
+    *direction = turns ? es_turned(chosen.wi, mirrored, edited) : chosen.wi;
     *weight = chosen.weight;
     return true;
 }
