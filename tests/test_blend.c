@@ -8,6 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "tests/pictures.h"
 #include "tests/races.h"
 #include "tests/reference_runs.h"
 #include "tests/same_bits.h"
@@ -34,41 +35,6 @@ static es_renderer_settings settings_of(void)
     s.micro_points = 1024;
     s.micro_size = 8;
     return s;
-}
-
-static es_renderer* renderer_of(es_context* context, const es_renderer_settings* settings)
-{
-    es_renderer* renderer;
-    assert_int_equal(es_renderer_create(context, settings, &renderer), ES_OK);
-    return renderer;
-}
-
-static void render(es_renderer* renderer, es_world* world) { assert_int_equal(es_renderer_render(renderer, world), ES_OK); }
-
-static es_image picture(es_renderer* renderer, const char* name)
-{
-    es_image image;
-    assert_int_equal(es_renderer_image(renderer, name, &image), ES_OK);
-    return image;
-}
-
-/* Rendered by itself. */
-static es_image picture_of(small_world* w, const es_renderer_settings* settings, const char* name)
-{
-    es_renderer* renderer = renderer_of(w->context, settings);
-    render(renderer, w->world);
-    es_image image = picture(renderer, name);
-    es_renderer_destroy(renderer);
-    return image;
-}
-
-static const es_pass_stats* pass_of(const es_renderer* renderer, const char* name)
-{
-    const es_frame_stats* stats = es_renderer_stats(renderer);
-    for (size_t i = 0; i < stats->pass_count; i++)
-        if (!strcmp(stats->passes[i].name, name)) return &stats->passes[i];
-    fail_msg("there is no pass %s", name);
-    return NULL;
 }
 
 static es_material_desc glowing(const float emission[3], float alpha, bool blend)

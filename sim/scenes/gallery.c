@@ -40,16 +40,8 @@ static es_material phong(es_scene_builder* builder, const char* name, float r, f
 /* Walls, floor and ceiling are seen from inside alone. */
 static void add_shell(es_scene_builder* builder)
 {
-    enum { COLUMNS = 8, ROWS = 11 };
-    const float tile_x = (high_x - low_x) / COLUMNS, tile_z = (high_z - low_z) / ROWS;
-    es_shape floors[2] = {es_build_shape(builder), es_build_shape(builder)};
-    for (int row = 0; row < ROWS; row++)
-        for (int column = 0; column < COLUMNS; column++) {
-            const float x = low_x + tile_x * (float)column, z = low_z + tile_z * (float)row;
-            es_shape_quad(&floors[(row + column) % 2], es_v3(x, 0, z), es_v3(x + tile_x, 0, z), es_v3(x + tile_x, 0, z + tile_z), es_v3(x, 0, z + tile_z), es_v3(0, 1, 0));
-        }
-    es_build_object(builder, "light slabs", &floors[0], es_build_gloss(builder, "travertine", 0.56f, 0.50f, 0.42f, 0, 0.2f), es_v3(0, 0, 0));
-    es_build_object(builder, "dark slabs", &floors[1], es_build_gloss(builder, "slate", 0.16f, 0.16f, 0.17f, 0, 0.2f), es_v3(0, 0, 0));
+    const es_material pale = es_build_gloss(builder, "travertine", 0.56f, 0.50f, 0.42f, 0, 0.2f), dark = es_build_gloss(builder, "slate", 0.16f, 0.16f, 0.17f, 0, 0.2f);
+    es_build_slabs(builder, es_v3(low_x, 0, low_z), es_v3(high_x, 0, high_z), 8, 11, pale, dark);
 
     const es_vec3 size = {high_x - low_x, ceiling_y, high_z - low_z};
     es_shape ceiling = es_build_shape(builder), ends = es_build_shape(builder), left = es_build_shape(builder), right = es_build_shape(builder);

@@ -21,16 +21,8 @@ static uint32_t steps(const detail* d, float count, uint32_t least)
 
 static void add_shell(es_scene_builder* builder)
 {
-    enum { COLUMNS = 8, ROWS = 8 };
-    const float tile_x = (high_x - low_x) / COLUMNS, tile_z = (high_z - low_z) / ROWS;
-    es_shape floors[2] = {es_build_shape(builder), es_build_shape(builder)};
-    for (int row = 0; row < ROWS; row++)
-        for (int column = 0; column < COLUMNS; column++) {
-            const float x = low_x + tile_x * (float)column, z = low_z + tile_z * (float)row;
-            es_shape_quad(&floors[(row + column) % 2], es_v3(x, 0, z), es_v3(x + tile_x, 0, z), es_v3(x + tile_x, 0, z + tile_z), es_v3(x, 0, z + tile_z), es_v3(0, 1, 0));
-        }
-    es_build_object(builder, "light slabs", &floors[0], es_build_lambert(builder, "cream", 0.66f, 0.61f, 0.52f), es_v3(0, 0, 0));
-    es_build_object(builder, "dark slabs", &floors[1], es_build_lambert(builder, "brick", 0.42f, 0.17f, 0.11f), es_v3(0, 0, 0));
+    const es_material pale = es_build_lambert(builder, "cream", 0.66f, 0.61f, 0.52f), dark = es_build_lambert(builder, "brick", 0.42f, 0.17f, 0.11f);
+    es_build_slabs(builder, es_v3(low_x, 0, low_z), es_v3(high_x, 0, high_z), 8, 8, pale, dark);
     const es_vec3 size = {high_x - low_x, height, high_z - low_z};
     es_shape white = es_build_shape(builder), blue = es_build_shape(builder), green = es_build_shape(builder);
     es_shape_plane(&white, es_v3(low_x, height, low_z), es_v3(size.x, 0, 0), es_v3(0, 0, size.z), es_v3(0, -1, 0), 4, 4);

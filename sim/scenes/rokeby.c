@@ -12,16 +12,8 @@ static const float low_x = -2.8f, high_x = 3.0f, low_z = -2.9f, high_z = 4.2f, h
 
 static void add_shell(es_scene_builder* builder)
 {
-    enum { COLUMNS = 8, ROWS = 10 };
-    const float tile_x = (high_x - low_x) / COLUMNS, tile_z = (high_z - low_z) / ROWS;
-    es_shape floors[2] = {es_build_shape(builder), es_build_shape(builder)};
-    for (int row = 0; row < ROWS; row++)
-        for (int column = 0; column < COLUMNS; column++) {
-            const float x = low_x + tile_x * (float)column, z = low_z + tile_z * (float)row;
-            es_shape_quad(&floors[(row + column) % 2], es_v3(x, 0, z), es_v3(x + tile_x, 0, z), es_v3(x + tile_x, 0, z + tile_z), es_v3(x, 0, z + tile_z), es_v3(0, 1, 0));
-        }
-    es_build_object(builder, "light slabs", &floors[0], es_build_lambert(builder, "limestone", 0.58f, 0.52f, 0.44f), es_v3(0, 0, 0));
-    es_build_object(builder, "dark slabs", &floors[1], es_build_lambert(builder, "basalt", 0.16f, 0.14f, 0.14f), es_v3(0, 0, 0));
+    const es_material pale = es_build_lambert(builder, "limestone", 0.58f, 0.52f, 0.44f), dark = es_build_lambert(builder, "basalt", 0.16f, 0.14f, 0.14f);
+    es_build_slabs(builder, es_v3(low_x, 0, low_z), es_v3(high_x, 0, high_z), 8, 10, pale, dark);
     const es_vec3 size = {high_x - low_x, height, high_z - low_z};
     es_shape ceiling = es_build_shape(builder), ends = es_build_shape(builder), left = es_build_shape(builder), right = es_build_shape(builder);
     es_shape_plane(&ceiling, es_v3(low_x, height, low_z), es_v3(size.x, 0, 0), es_v3(0, 0, size.z), es_v3(0, -1, 0), 4, 4);

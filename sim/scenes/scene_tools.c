@@ -70,6 +70,19 @@ es_node es_build_object(es_scene_builder* builder, const char* name, es_shape* s
     return node;
 }
 
+void es_build_slabs(es_scene_builder* builder, es_vec3 low, es_vec3 high, int columns, int rows, es_material light, es_material dark)
+{
+    const float tile_x = (high.x - low.x) / (float)columns, tile_z = (high.z - low.z) / (float)rows;
+    es_shape floors[2] = {es_build_shape(builder), es_build_shape(builder)};
+    for (int row = 0; row < rows; row++)
+        for (int column = 0; column < columns; column++) {
+            const float x = low.x + tile_x * (float)column, z = low.z + tile_z * (float)row;
+            es_shape_quad(&floors[(row + column) % 2], es_v3(x, 0, z), es_v3(x + tile_x, 0, z), es_v3(x + tile_x, 0, z + tile_z), es_v3(x, 0, z + tile_z), es_v3(0, 1, 0));
+        }
+    es_build_object(builder, "light slabs", &floors[0], light, es_v3(0, 0, 0));
+    es_build_object(builder, "dark slabs", &floors[1], dark, es_v3(0, 0, 0));
+}
+
 es_quat es_look_rotation(es_vec3 direction)
 {
     float yaw = es_atan2(-direction.x, -direction.z);

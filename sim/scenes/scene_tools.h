@@ -20,6 +20,8 @@ es_node es_build_node(es_scene_builder* builder, const char* name, es_vec3 trans
 es_instance es_build_instance(es_scene_builder* builder, es_node node, es_mesh mesh, es_material material);
 /* A mesh on its own node. */
 es_node es_build_object(es_scene_builder* builder, const char* name, es_shape* shape, es_material material, es_vec3 translation);
+/* A floor at y = 0 of slabs of two materials in turns, each of which is an object. */
+void es_build_slabs(es_scene_builder* builder, es_vec3 low, es_vec3 high, int columns, int rows, es_material light, es_material dark);
 void es_build_camera(es_scene_builder* builder, es_vec3 eye, es_vec3 direction, float fov_y, float near_plane);
 es_node es_build_spot(es_scene_builder* builder, es_vec3 position, es_vec3 direction, const float color[3], float intensity, float inner_cone, float outer_cone);
 /* Turns -z to `direction`, keeping x level. */
